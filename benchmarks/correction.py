@@ -22,6 +22,7 @@ from numba import set_num_threads
 from skimage import restoration
 
 from chipglow import AnnularAperturePSF, Band, Camera, Estimate, Measurement, Raster
+from chipglow.camera import image_formation
 from chipglow.correction import Zone, correct
 from chipglow.scene import Polygon, Region
 
@@ -91,7 +92,7 @@ def scene(seed, pixels):
     netd = float(np.exp(draw.uniform(np.log(0.1), np.log(2.0))))
     kelvins = np.where(to_tool > 0, tool, chip)
     shining = np.where(to_tool > 0, *EMISSIVITY[::-1]) * BAND.radiance(kelvins)
-    image = CAMERA.image_formation(samples, pixels=raster(pixels)).forward(shining)
+    image = image_formation(CAMERA, samples, pixels=raster(pixels)).forward(shining)
     image = image + draw.normal(0, netd * float(BAND.slope(600.0)), image.shape)
     edge = slice(MARGIN * SAMPLES, -MARGIN * SAMPLES)
     fields = (field[edge, edge] for field in (kelvins, to_tool, from_band))

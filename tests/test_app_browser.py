@@ -138,7 +138,7 @@ def turn(page, label, text):
 
 def expected(model, texts):
     """What the library measures at the cursor, as the page writes it."""
-    state = model.controls.changed(model.controls.initial, texts)
+    state = model.controls.state_with(model.controls.initial, texts)
     measured = model.numbers(model.picture(state))["measured"]
     return f"{measured - 273.15:.1f} °C"
 
@@ -262,7 +262,7 @@ def test_a_line_and_the_cursor_are_dragged(page, model):
     pixel = 660 / 290  # µm on the screen, about
     assert np.hypot(found[0] + 400, found[1] - 150) < 3 * pixel
     moved = {"band_line": ends.input_value()}
-    state = model.controls.changed(model.controls.initial, moved)
+    state = model.controls.state_with(model.controls.initial, moved)
     values = model.picture(state).lines["band_line"]["measured"]
     assert np.isfinite(values).all()
     # The numbers follow the line's place when they are computed.
@@ -381,6 +381,26 @@ def test_draws_show_progress_and_can_be_cancelled(page):
     ready(page)
     page.get_by_role("button", name="Draw phases").click()
     page.locator("#status", has_text="over 9 draws").wait_for()
+
+
+def test_the_image_is_corrected_while_the_controls_stay_live(page):
+    # Of large pixels all are corrected in a second.
+    turn(page, "Pixel pitch", "20")
+    page.wait_for_url("**camera.pitch=20*")
+    control(page, "images").select_option("correction")
+    page.locator("#status", has_text="Correcting the pixels").wait_for()
+    page.get_by_role("progressbar", name="Progress").wait_for()
+    turn(page, "Numerical aperture", "0.3")  # while it is being corrected
+    page.wait_for_url("**numerical_aperture=0.3*")
+    page.locator("#status", has_text=re.compile("^Corrected: ")).wait_for()
+    bars = page.get_by_role("table", name="Contributions to its standard uncertainty")
+    assert bars.locator(".bar").count() >= 4
+    assert re.search(r"°C ± \d", number(page, "corrected (95 %)").inner_text())
+    assert control(page, "error_image").is_hidden()
+    title = "(name) => Bokeh.documents[0].get_model_by_name(name).title.text"
+    assert page.evaluate(title, "error_figure") == "Half-width (95 %) / K"
+    control(page, "correction_image").select_option("true")
+    page.wait_for_function(f"() => ({title})('error_figure') === 'True temperature / °C'")
 
 
 def test_all_is_reached_by_the_keyboard_in_either_theme(page):

@@ -31,8 +31,11 @@ MOST_UPLOADED: Final = 512 * 1024**2
 """Maximum size of an uploaded file in bytes."""
 
 _MOST_OPEN: Final = 8
+"""Uploaded files that stay open; older ones are closed."""
 
-SHOWN: Final = ("start", "scene_image", "error_image")
+SHOWN: Final = (
+    "start", "images", "scene_image", "error_image", "correction_image", "emissivity_uncertainty",
+)  # fmt: skip
 """Settings of the page that a study does not have."""
 
 SHOWN_LINE: Final = "# Shown in chipglow app: "

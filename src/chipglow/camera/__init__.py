@@ -15,17 +15,17 @@ from chipglow.camera.calibration import (
     LinearCalibration as LinearCalibration,
     SakumaHattori as SakumaHattori,
 )
-from chipglow.camera.camera import (
-    PAPER_LIMIT as PAPER_LIMIT,
-    Camera as Camera,
-    CameraSettings as CameraSettings,
-    ChipglowWarning as ChipglowWarning,
-)
+from chipglow.camera.camera import PAPER_LIMIT as PAPER_LIMIT, Camera as Camera
 from chipglow.camera.chain import (
     Chain as Chain,
     ExposedChain as ExposedChain,
     PixelReading as PixelReading,
     read_temperature as read_temperature,
+)
+from chipglow.camera.description import (
+    CameraDescription as CameraDescription,
+    CameraSettings as CameraSettings,
+    ChipglowWarning as ChipglowWarning,
 )
 from chipglow.camera.detector.detector import Detector as Detector
 from chipglow.camera.detector.flat_field import (
@@ -68,10 +68,11 @@ from chipglow.camera.detector.terms import (
 from chipglow.camera.effect import EVERY as EVERY, Effect as Effect
 from chipglow.camera.exposure import (
     Exposure as Exposure,
-    View as View,
+    SpectralView as SpectralView,
     expose as expose,
     frame_weights as frame_weights,
 )
+from chipglow.camera.image import image_formation as image_formation
 from chipglow.camera.measurement import (
     UNUSABLE as UNUSABLE,
     Flag as Flag,

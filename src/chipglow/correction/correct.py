@@ -12,6 +12,7 @@ from scipy import sparse
 from scipy.special import stdtrit
 
 from chipglow.camera import Camera, Flag, Measurement, check_camera
+from chipglow.camera.image import image_formation
 from chipglow.correction.cells import CELLS_PER_PIXEL, Parts, cut_cells
 from chipglow.correction.correction import Correction, CorrectionFlag, joined
 from chipglow.correction.noise import noise_of
@@ -59,6 +60,7 @@ beyond them as that of their edge.
 """
 
 _LEVEL: Final = 0.95
+"""Probability of the expanded uncertainties."""
 
 
 def correct(
@@ -317,7 +319,7 @@ def _located(
 
 def _problem(image: Image, camera: Camera, known: Knowledge, pixels: Raster) -> Problem:
     parts = cut_cells(known.observed, pixels)
-    formation = camera.image_formation(parts.cells, pixels=pixels)
+    formation = image_formation(camera, parts.cells, pixels=pixels)
     room = float(known.band.radiance(known.surroundings.values))
     cells = parts.cells.rows * parts.cells.columns
     mirrored = np.bincount(parts.cell, parts.area * (1 - parts.emissivity), cells)

@@ -28,11 +28,16 @@ _STEPS: Final = 2
 """Steps for each estimate of the weights, which a following one improves."""
 
 _STEP_TOLERANCE: Final = 3e-2
+"""Relative residual at which the solution of a step ends: a step is repeated."""
+
 _DRAW_TOLERANCE: Final = 1e-2
+"""Relative residual of a draw, far below the scatter of a standard deviation from a few draws."""
+
 _CHANGE_TOLERANCE: Final = 1e-3
 """Relative residuals of steps, which are repeated, of draws, and of changes by single errors."""
 
 _MOST_ITERATIONS: Final = 200
+"""Most iterations of conjugate gradients."""
 
 _BLURRED_WEIGHT: Final = 0.5
 """Weight of the data in the preconditioner, which has no blur: blur halves about this part."""
@@ -47,6 +52,7 @@ _ROUNDS: Final = 3
 """Rounds in which the weights of the prior follow from the solution and its uncertainty."""
 
 _DRAWS_PER_ROUND: Final = 3
+"""Draws from which the uncertainty in the weights of the prior follows, in each round."""
 
 
 @dataclass(frozen=True, eq=False)

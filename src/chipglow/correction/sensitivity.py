@@ -36,6 +36,7 @@ _OUTLINE_STEP: Final = 0.03
 """Displacement of the outlines in pixels for derivatives; cells are cut to 1/8192 of a pixel."""
 
 _PSF_DRAWS: Final = 6
+"""Draws of the point spread function within its uncertainty."""
 
 _LEAST_DATA: Final = 1e-4
 """Least number of data for a part: below it, a detail would be larger than 100 cells."""

@@ -1,7 +1,7 @@
 """Conditions of a cut: speed, feed, friction, output window, numerics."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Final, Self
 
 from chipglow.quantities import Parameter, Part, zero_to_one
@@ -66,7 +66,7 @@ class Friction(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0 <= self.conductance < 1e12:
+        if not 0 <= self.conductance < 1e12:  # more than any contact conducts, for a finite number
             raise ValueError(f"conductance: {self.conductance!r} W/(m2 K), expected 0 to 1e12")
 
 
@@ -193,6 +193,7 @@ class Numerics(Part):
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("upstream", "downstream", "depth", "height"):
+            # Splines at both borders need some cells; 0.1 m is beyond any cut's field of view.
             if not 8 * self.cell <= getattr(self, name) <= 0.1:
                 raise ValueError(f"{name}: {getattr(self, name)!r} m, expected 8 cells to 0.1 m")
 
@@ -204,6 +205,22 @@ class Numerics(Part):
         return replace(
             self, **{name: max(getattr(self, name), at + rim) for name, at in reach.items()}
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class CutSettings(Part):
+    """Settings of a `CuttingSimulation` that a study states as it takes them."""
+
+    friction: Annotated[Friction, Parameter("Friction between chip and tool.")] = field(
+        default_factory=Friction
+    )
+    surroundings: Annotated[
+        Surroundings,
+        Parameter("Surroundings to which chip, workpiece and tool lose heat; none by default."),
+    ] = field(default_factory=Surroundings)
+    numerics: Annotated[Numerics, Parameter("Cells and time steps of the computation.")] = field(
+        default_factory=Numerics
+    )
 
 
 def unresolved(lengths: Mapping[str, float], cell: float) -> tuple[str, ...]:

@@ -1,17 +1,15 @@
 """The section of the cut: the paper's Table 2 by default."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, ValidationInfo
 
 from chipglow.cutting import (
+    CutSettings,
     CuttingConditions,
     CuttingSimulation,
-    Friction,
-    Numerics,
     OutputWindow,
-    Surroundings,
     ToolBody,
     WorkpieceMaterial,
     is_own_file,
@@ -21,8 +19,8 @@ from chipglow.cutting import (
 )
 from chipglow.cutting.conditions import INITIAL_TEMPERATURE
 from chipglow.io import ToolSection
-from chipglow.quantities import Parameter, beside_the_study, made_from
-from chipglow.quantities.units import LENGTH, TEMPERATURE
+from chipglow.quantities import Parameter, Part, beside_the_study, made_from
+from chipglow.quantities.units import TEMPERATURE
 from chipglow.scene import Raster
 
 STEADY: Final = "steady"
@@ -35,18 +33,24 @@ class FieldOfViewSection(Raster):
 
     left: float = -650e-6
     top: float = 700e-6
-    spacing: Annotated[
-        float,
-        Parameter(
-            "Side of a sample. camera.pitch should be a whole multiple of it; the paper has 9.",
-            LENGTH,
-        ),
-    ] = 2 / 3e6
+    spacing: float = 2 / 3e6
     rows: int = 1170
     columns: int = 1035
 
     def build(self) -> Raster:
         return made_from(Raster, self)
+
+
+@dataclass(frozen=True)
+class WindowSection(OutputWindow):
+    """The part of the cut that becomes the scene; the paper's by default."""
+
+    def __post_init__(self) -> None:
+        # `build` checks the order of the ends, when those that follow from others are known.
+        Part.__post_init__(self)
+
+    def build(self) -> OutputWindow:
+        return made_from(OutputWindow, self)
 
 
 @dataclass(frozen=True)
@@ -83,8 +87,8 @@ def _known(name: str, info: ValidationInfo) -> str:
 
 
 @dataclass(frozen=True)
-class CuttingSection(CuttingConditions):
-    """The cutting simulation; the paper's Table 2."""
+class WorkpieceAndTool(CuttingConditions):
+    """What is cut with which tool, and how fast."""
 
     workpiece: Annotated[
         str,
@@ -106,32 +110,38 @@ class CuttingSection(CuttingConditions):
     tool: Annotated[CutToolSection, Parameter("The cutting tool.")] = field(
         default_factory=CutToolSection
     )
-    friction: Annotated[Friction, Parameter("Friction between chip and tool.")] = field(
-        default_factory=Friction
-    )
-    surroundings: Annotated[
-        Surroundings,
-        Parameter("Surroundings to which chip, workpiece and tool lose heat; none by default."),
-    ] = field(default_factory=Surroundings)
-    numerics: Annotated[Numerics, Parameter("Cells and time steps of the computation.")] = field(
-        default_factory=Numerics
-    )
-    window: Annotated[OutputWindow, Parameter("The part of the cut that becomes the scene.")] = (
-        field(default_factory=OutputWindow)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CuttingSection(CutSettings, WorkpieceAndTool):
+    """The cutting simulation; the paper's Table 2."""
+
+    window: Annotated[WindowSection, Parameter("The part of the cut that becomes the scene.")] = (
+        field(default_factory=WindowSection)
     )
     field_of_view: Annotated[
         FieldOfViewSection,
-        Parameter("Samples of the scene: the tool's tip is near the origin, y points up."),
+        Parameter(
+            "Samples of the scene: the tool's tip is near the origin, y points up. camera.pitch "
+            "should be a whole multiple of spacing; the paper has 9."
+        ),
     ] = field(default_factory=FieldOfViewSection)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self.material()
+
+    def check_window(self) -> None:
+        """Raise a ValueError unless the window is a part of the cut."""
+        try:
+            self.window.build()
+        except ValueError as error:
+            raise ValueError(f"window: {error}") from None
         if self.window.end > self.cutting_length * (1 + 1e-9):
             raise ValueError(
                 f"window.end: {self.window.end * 1e3:g} mm is beyond cutting_length, "
                 f"expected up to {self.cutting_length * 1e3:g} mm"
             )
-        self.material()
 
     def material(self) -> WorkpieceMaterial:
         """Return the workpiece's material, with the factors on its numbers."""
@@ -144,14 +154,13 @@ class CuttingSection(CuttingConditions):
 
     def simulation(self) -> CuttingSimulation:
         """Return the simulation of a region that holds the field of view."""
-        conditions = {one.name: getattr(self, one.name) for one in fields(CuttingConditions)}
-        return CuttingSimulation(
-            conditions=CuttingConditions(**conditions),
+        return made_from(
+            CuttingSimulation,
+            self,
+            conditions=made_from(CuttingConditions, self),
             tool=self.tool.build(),
             workpiece=self.material(),
             tool_material=tool_material(self.tool.material),
-            friction=self.friction,
             numerics=self.numerics.around(self.field_of_view.build()),
-            surroundings=self.surroundings,
             tool_temperature=self.tool.start(),
         )

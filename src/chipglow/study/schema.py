@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 from html import escape
 from typing import Annotated, Any, Self
 
-from chipglow.analysis import AttributionPlan, Plan, WavelengthPlan
+from chipglow.analysis import AttributionPlan, CorrectionPlan, Plan, WavelengthPlan
 from chipglow.camera import AnnularAperturePSF
-from chipglow.quantities import FileBeside, Parameter, Part, changed, value_at
+from chipglow.quantities import FileBeside, Parameter, Part, changed
 from chipglow.study.camera_section import CameraSection
 from chipglow.study.cutting_section import STEADY, CuttingSection
-from chipglow.study.scaling import DERIVED, VIEWS, scaled, without
+from chipglow.study.scaling import resolved
 from chipglow.study.surface_section import FeaturesSection, SurfaceSection, surface_names
 from chipglow.study.uncertainty_section import UncertaintySection
 from chipglow.text import commented_yaml
@@ -65,6 +65,14 @@ class Study(Part):
         Parameter("Effects among which the error of each pixel is divided; none: it is not."),
     ] = field(default_factory=AttributionPlan)
 
+    correction: Annotated[
+        bool,
+        Parameter(
+            "Whether the report of a cut corrects rake face and shear band for all that is known. "
+            "Standard uncertainties are those of uncertainty.inputs, else that of the heated chip."
+        ),
+    ] = True
+
     wavelengths: Annotated[
         WavelengthPlan, Parameter("Bands that chipglow wavelengths compares, alone and as ratios.")
     ] = field(default_factory=WavelengthPlan)
@@ -80,7 +88,8 @@ class Study(Part):
     @property
     def plan(self) -> Plan:
         """The plan of the analysis, with PSF widths around the camera's."""
-        plan = replace(self.analysis, attribution=self.attribution)
+        known = self._known() if self.correction else None
+        plan = replace(self.analysis, attribution=self.attribution, correction=known)
         psf = self.camera.build().psf
         ratio = 1.0 if psf is None else psf.fwhm / AnnularAperturePSF().fwhm
         if "psf_widths" not in self.analysis.given and ratio != 1.0:
@@ -90,6 +99,20 @@ class Study(Part):
             return plan
         (name,) = surface_names(self.surface)
         return replace(plan, rake_chip=name, band_chip=name)
+
+    def _known(self) -> CorrectionPlan:
+        """Return the uncertainties of emissivity and PSF width among the inputs of the budget."""
+        inputs = {one.name: one for one in self.uncertainty.build(self).inputs}
+        width = inputs.get("camera.psf.fwhm", inputs.get("camera.psf.numerical_aperture"))
+        emissivity = {}
+        for surface in surface_names(self.surface):
+            paths = f"surface.chips.{surface}.body.mean", "surface.emissivity"
+            for path in paths:
+                if path in inputs:
+                    emissivity[surface] = inputs[path].standard_uncertainty
+        return CorrectionPlan(
+            emissivity, 0.0 if width is None else width.standard_uncertainty / width.value
+        )
 
     def with_steady_tool(self) -> Self:
         """Return the same study with a tool at steady-state temperature."""
@@ -128,34 +151,32 @@ class Study(Part):
         return changed(cls(), {"title": title, **paths, "analysis": draws})
 
     @classmethod
-    def completed(cls, data: Any, from_file: bool) -> Any:
-        """Return the data with the surface's usual kind, and what follows from feed and camera."""
+    def completed(cls, data: Any) -> Any:
+        """Return the data with the surface's usual kind."""
         if not isinstance(data, Mapping):
             return data
         surface = data.get("surface")
         if isinstance(surface, Mapping) or (surface is None and "surface" in data):
-            data = {**data, "surface": {"kind": "features", **(surface or {})}}
-        return scaled(data, from_file)
-
-    def stated(self) -> dict[str, Any]:
-        """Return the given settings without those that follow from others."""
-        cutting = self.cutting.stated()
-        data = super().stated() | {"camera": self.camera.stated(), "cutting": cutting}
-        data["cutting"] |= {name: cutting[name].stated() for name in VIEWS if name in cutting}
-        try:
-            plain = type(self)(**without(data, DERIVED))
-        except ValueError:  # what is left is impossible
-            return data
-        return without(
-            data, [path for path in DERIVED if value_at(plain, path) == value_at(self, path)]
-        )
+            return {**data, "surface": {"kind": "features", **(surface or {})}}
+        return data
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self._resolve_cutting()
         if isinstance(self.surface, FeaturesSection):
             self._check_chips()
         if self.scene is None:
             self._check_camera()
+
+    def _resolve_cutting(self) -> None:
+        """Set what follows from feed, rake angle, speed and camera, if the scene is a cut."""
+        try:
+            if self.scene is None:
+                object.__setattr__(self, "cutting", resolved(self.cutting, self.camera))
+                object.__setattr__(self, "given", self.given | {"cutting"})
+            self.cutting.check_window()
+        except ValueError as error:
+            raise ValueError(f"cutting.{error}") from None
 
     def _check_chips(self) -> None:
         for name in ("rake_chip", "band_chip"):

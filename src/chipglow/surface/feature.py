@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH
 from chipglow.radiometry import Band
+from chipglow.radiometry.band import PAPER_BAND
 from chipglow.scene import Frame, Material, Raster, Scene
 from chipglow.scene.raster import check_shape
 from chipglow.surface.blend import (
@@ -36,8 +37,32 @@ _WORKPIECE, _TOOL_SIDE = Emissivity(0.40, 0.03), Emissivity(0.58, 0.06)
 """The paper's Table 1."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class FeatureSettings(Part):
+    """Settings of a `FeatureSurface` that a study states once for all its chips."""
+
+    workpiece: Annotated[
+        Emissivity, Parameter("The uncut workpiece; the paper assumed these numbers.")
+    ] = _WORKPIECE
+    tool: Annotated[Emissivity, Parameter("The tool's side.")] = _TOOL_SIDE
+    grain: Annotated[float, Parameter("Size of a grain of the emissivity's texture.", LENGTH)] = (
+        20e-6
+    )
+    follow: Annotated[
+        Literal["material", "mean", "none"],
+        Parameter(
+            "How textures move: material (each point keeps its own, by the scene's material "
+            "coordinates), mean (the paper's shift by the feature's mean velocity) or none."
+        ),
+    ] = "material"
+    restore_standard_deviation: Annotated[
+        bool,
+        Parameter("Make up for the standard deviation that is lost when a texture is enlarged."),
+    ] = True
+
+
 @dataclass(frozen=True)
-class FeatureSurface(Surface, Part):
+class FeatureSurface(FeatureSettings, Surface):
     """Emissivity of workpiece, chip, shear band and tool, each with a random texture.
 
     Raises
@@ -56,27 +81,9 @@ class FeatureSurface(Surface, Part):
 
     chip: Annotated[Emissivity, Parameter("Body of the chip's segments.")]
     shear_band: Annotated[Emissivity, Parameter("Shear bands: the paper's fissures.")]
-    workpiece: Annotated[
-        Emissivity, Parameter("The uncut workpiece; the paper assumed these numbers.")
-    ] = _WORKPIECE
-    tool: Annotated[Emissivity, Parameter("The tool's side.")] = _TOOL_SIDE
-    grain: Annotated[float, Parameter("Size of a grain of the emissivity's texture.", LENGTH)] = (
-        20e-6
-    )
-    follow: Annotated[
-        Literal["material", "mean", "none"],
-        Parameter(
-            "How textures move: material (each point keeps its own, by the scene's material "
-            "coordinates), mean (the paper's shift by the feature's mean velocity) or none."
-        ),
-    ] = "material"
     seed: Annotated[
         int, Parameter("Seed of the textures; each feature has a separate stream.", least=0)
     ] = 2010
-    restore_standard_deviation: Annotated[
-        bool,
-        Parameter("Make up for the standard deviation that is lost when a texture is enlarged."),
-    ] = True
     origin: Origin = UNKNOWN  # type: ignore[misc]
 
     @cached_property
@@ -140,7 +147,7 @@ class FeatureSurface(Surface, Part):
         return replace(self, **means)
 
 
-PAPER_ORIGIN: Final = Origin((3.8e-6, 5.1e-6), "AISI 1045")
+PAPER_ORIGIN: Final = Origin(PAPER_BAND, "AISI 1045")
 """Origin of the emissivities of the paper's Table 1."""
 
 CHIP_1: Final = FeatureSurface(
@@ -260,7 +267,7 @@ class EmissivityStack:
         if self.features is None:
             return np.stack([field.emissivity(frame) for field in self.fields])
         bare = self.features.emissivities(frame)
-        return np.stack([f.changed(one, frame) for f, one in zip(self.fields, bare, strict=True)])
+        return np.stack([f.modified(one, frame) for f, one in zip(self.fields, bare, strict=True)])
 
 
 @dataclass(frozen=True)
@@ -294,7 +301,7 @@ class FeatureTrends(Modifier):
         drawn = drawn_trends(tuple(self.trends.values()), self.draw)
         lines = dict(zip(self.trends, drawn, strict=True))
 
-        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
+        def at_temperature(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
             result, fractions = emissivity.astype(np.float64), feature_fractions(frame)
             for name in FEATURES:
                 if name in lines:
@@ -302,7 +309,7 @@ class FeatureTrends(Modifier):
                     result += fractions[name] * away
             return np.clip(result, 0.0, 1.0)
 
-        return changed
+        return at_temperature
 
 
 def feature_fractions(frame: Frame) -> dict[str, NDArray[np.float64]]:

@@ -27,8 +27,12 @@ Mirror: TypeAlias = Literal["none", "horizontal", "vertical"]
 
 _SAME: Final = 0.01
 """Relative difference up to which two integration times or limits of bands are the same."""
+
 _PIXELS_AT_ONCE: Final = 1 << 22
+"""Pixels that are converted together: 32 MB for each array in between."""
+
 _FULL_SCALES: Final = tuple(2**bits - 1 for bits in (8, 10, 12, 13, 14, 16))
+"""Largest counts of the usual converters, by their bits."""
 
 
 def _two_numbers(value: object) -> object:
@@ -173,7 +177,7 @@ def _check_same(recording: Recording, calibration: Calibration) -> None:
     ours, theirs = recording.integration_time, calibration.integration_time
     if ours is not None and theirs is not None and abs(ours - theirs) > _SAME * theirs:
         apart.append((f"an integration time of {1e6 * theirs:g} us", f"{1e6 * ours:g} us"))
-    ranges = calibration.range_name, recording.range_name
+    ranges = calibration.range, recording.range
     if None not in ranges and ranges[0] != ranges[1]:
         apart.append((f"the range {ranges[0]!r}", repr(ranges[1])))
     band = recording.band
@@ -271,7 +275,7 @@ def _attributes(
         "quantity": recording.quantity,
         "fill_factor": recording.fill_factor,
         "integration_time": time,
-        "range": recording.range_name or getattr(calibration, "range_name", None),
+        "range": recording.range or getattr(calibration, "range", None),
         "calibration": calibration.description if calibration else None,
         "object_parameters": _object_text(recording),
         **_notes(recording, calibration, position, is_read).attrs(),
@@ -303,7 +307,7 @@ def _notes(
     position: ImagePosition,
     is_read: NDArray[np.bool_],
 ) -> Notes:
-    quantity, name = recording.quantity, getattr(calibration, "range_name", None)
+    quantity, name = recording.quantity, getattr(calibration, "range", None)
     time = getattr(calibration, "integration_time", None)
     assumed = {
         "The temperatures are radiance temperatures, as with an emissivity of 1: the file says "
@@ -315,7 +319,7 @@ def _notes(
             recording.integration_time is None and time is not None
         ),
         f"The range is the calibration's, {name}: the file does not state it.": (
-            recording.range_name is None and name is not None
+            recording.range is None and name is not None
         ),
         "No pixel is saturated: neither the file nor the description states the limit.": (
             recording.saturation is None
