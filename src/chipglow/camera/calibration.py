@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
-from typing import Any, ClassVar, Final
+from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera.recording import MeasuringRange, PlanckConversion
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import Array, Brief, Parameter
 from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import SECOND_RADIATION_CONSTANT
@@ -78,8 +78,18 @@ class CalibrationErrors(Brief):
         return Estimate(np.asarray(radiance), (self.component(self.at(radiance)),))
 
 
+@dataclass(frozen=True, kw_only=True)
+class CalibrationSettings(MeasuringRange):
+    """What is stated of a calibration beside its numbers."""
+
+    warnings: Annotated[
+        tuple[str, ...],
+        Parameter("Warnings, as sentences; every measurement with this calibration repeats them."),
+    ] = ()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Calibration(MeasuringRange, ABC):
+class Calibration(CalibrationSettings, ABC):
     """Meaning of a camera's counts; `description` says what it is."""
 
     description: ClassVar[str]
@@ -88,8 +98,6 @@ class Calibration(MeasuringRange, ABC):
     """Lowest valid radiance temperature in K."""
     highest: float = inf
     """Radiance temperature in K up to which it holds."""
-    warnings: tuple[str, ...] = ()
-    """Warnings, as sentences."""
 
     @abstractmethod
     def radiance(self, counts: ArrayLike) -> Array:

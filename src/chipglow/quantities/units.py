@@ -101,12 +101,6 @@ def parse_unit(text: str, base: str, name: str) -> Unit:
         raise ValueError(f"unknown unit {text[:60]!r} of {name}, {expected}") from None
 
 
-class InSI(float):
-    """A number in SI units that follows from other settings, where a file must state a unit."""
-
-    __slots__ = ()
-
-
 @dataclass(frozen=True)
 class Quantity:
     """Kind and unit of a setting: an annotation of fields that read text and hold SI floats.
@@ -136,7 +130,7 @@ class Quantity:
 
     def parse(self, value: object, si: bool = False) -> float:
         """Return the SI number of a text such as ``10 us``; if `si`, also of an SI number."""
-        if isinstance(value, InSI) or (si and is_number(value)):
+        if si and is_number(value):
             return self._checked(f"{value} {self.base}", float(value))
         if is_bare_number(value):
             raise ValueError(f"{value} has no unit, {self.expected}")

@@ -188,7 +188,7 @@ def _unset(
     for one in own_settings(section):
         if one.name in without or one.plain in ("none", []):
             continue
-        if one.name not in section.given:
+        if one.name not in section.given | section.derived:
             yield f"{prefix}{one.name} {_written(one.plain)}", papers is not None
         elif one.is_section:
             inner = getattr(papers, one.name, None)

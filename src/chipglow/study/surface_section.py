@@ -57,7 +57,7 @@ class ChipSection(Part):
         return {"anyOf": [section, {"enum": list(CHIPS)}]}
 
     @classmethod
-    def completed(cls, data: Any, from_file: bool) -> Any:
+    def completed(cls, data: Any) -> Any:
         """Return the data, or those of the paper's chip of this name."""
         if not isinstance(data, str):
             return data
