@@ -252,7 +252,7 @@ def test_a_study_chooses_it(tmp_path):
         hot=673.15,
         terms=(cam.GainPattern(0.02), cam.DarkCurrent(5e4), cam.ShotNoise(), cam.ReadNoise(500.0)),
     )
-    limit = cam.lower_range_limit(detector, cam.OperationPoint(BAND, 20e-6))
+    limit = cam.lower_range_limit(detector, cam.OperationPoint(BAND, integration_time=20e-6))
     expected = replace(
         cam.Camera.paper(), integration_time=20e-6, detector=detector, seed=7, lower_limit=limit
     )

@@ -9,13 +9,18 @@ import numpy as np
 
 from chipglow.camera.detector.detector import Detector
 from chipglow.camera.detector.flat_field import FlatFieldCalibration, flat_field_calibration
-from chipglow.camera.detector.response import OperationPoint, RangeResponse, in_tables
+from chipglow.camera.detector.response import (
+    ExposureSettings,
+    OperationPoint,
+    RangeResponse,
+    in_tables,
+)
 from chipglow.camera.optics.blurs import BLURS
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import sensor_raster
 from chipglow.camera.optics.terms import OPTICS_TERMS, OpticsTerm
-from chipglow.quantities import Array, Parameter, Part
-from chipglow.quantities.units import FREQUENCY, LENGTH, TIME, Position
+from chipglow.quantities import Array, Parameter, made_from
+from chipglow.quantities.units import LENGTH, TIME, Position
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 
@@ -28,16 +33,12 @@ class ChipglowWarning(UserWarning):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CameraSettings(Part):
+class CameraSettings(ExposureSettings):
     """Settings of a camera that a study states as `Camera` takes them."""
 
     pitch: Annotated[
         float, Parameter("Distance between pixels on the scene.", LENGTH, most=1e-2)
     ] = 6e-6
-    fill_factor: Annotated[
-        float,
-        Parameter("Sensitive fraction of the pixel area, a centred square.", over=0.0, most=1.0),
-    ] = 1.0
     psf_order: Annotated[
         Literal["optics", "detector"],
         Parameter(
@@ -45,8 +46,6 @@ class CameraSettings(Part):
             "values, as the paper does, so that the footprint counts twice."
         ),
     ] = "optics"
-    integration_time: Annotated[float, Parameter("Exposure time.", TIME)] = 10e-6
-    frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY)] = 600.0
     line_time: Annotated[
         float | None,
         Parameter(
@@ -179,7 +178,7 @@ class CameraDescription(CameraSettings):
         """Return the detector calibration for this many rows and columns; None without detector."""
         if self.detector is None:
             return None
-        point = OperationPoint(self.band, self.integration_time, self.frame_rate, self.fill_factor)
+        point = made_from(OperationPoint, self, band=self.band)
         return flat_field_calibration(self.detector, point, shape)
 
     def frame_times(self, start: float, count: int) -> Array:
