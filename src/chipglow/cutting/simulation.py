@@ -93,6 +93,10 @@ _CONTACT_DAMPING: Final = 0.2
 _LARGEST_DRIFT: Final = 0.1
 _FASTEST_DRIFT: Final = 0.4
 _HEAT_STABILITY: Final = 0.15
+_NO_BAND_WIDTH: Final = (
+    "The workpiece has no nonlocal viscosity: a shear band is about two cells wide, of any cell."
+)
+
 _INERTIA_FRACTION: Final = 0.0045
 _LARGEST_SCALING: Final = 1000.0
 
@@ -240,8 +244,12 @@ class CuttingSimulation:
     @property
     def resolution_warnings(self) -> tuple[str, ...]:
         """Sentences on lengths that fewer than `CELLS_NEEDED` cells resolve."""
-        lengths = (("feed", self.conditions.feed), ("edge radius", self.tool.corner_radius))
-        return unresolved(dict(lengths), self.numerics.cell)
+        lengths = {"feed": self.conditions.feed, "edge radius": self.tool.corner_radius}
+        resists = self.workpiece.nonlocal_viscosity
+        if resists is not None:
+            lengths["length of the nonlocal viscosity"] = resists.length
+            return unresolved(lengths, self.numerics.cell)
+        return (*unresolved(lengths, self.numerics.cell), _NO_BAND_WIDTH)
 
     @property
     def point_steps(self) -> float:
