@@ -19,6 +19,7 @@ from numba import set_num_threads
 from skimage import restoration
 
 from chipglow import AnnularAperturePSF, Band, Camera, Estimate, Measurement, Raster
+from chipglow.camera import image_formation
 from chipglow.correction import Zone, correct
 from chipglow.scene import Polygon, Region
 
@@ -82,7 +83,7 @@ def scene(seed, pixels):
     netd = float(np.exp(draw.uniform(np.log(0.1), np.log(2.0))))
     kelvins = np.where(to_tool > 0, tool, chip)
     shining = np.where(to_tool > 0, *EMISSIVITY[::-1]) * BAND.radiance(kelvins)
-    image = CAMERA.image_formation(samples).forward(shining)
+    image = image_formation(CAMERA, samples).forward(shining)
     image = image + draw.normal(0, netd * float(BAND.slope(600.0)), image.shape)
     return Scene(kelvins, to_tool, from_band, width, netd, (*normal, place), image)
 

@@ -236,8 +236,15 @@ class Laboratory:
         elif path.suffix == ".tif":
             tifffile.imwrite(path, counts)
         else:
-            described = "counts", np.arange(count) / 600.0, "laboratory", INTEGRATION_TIME
-            write_hcc(path, camera.Recording(counts, *described, float(self.detector.saturation)))
+            recording = camera.Recording(
+                counts,
+                "counts",
+                np.arange(count) / 600.0,
+                camera="laboratory",
+                integration_time=INTEGRATION_TIME,
+                saturation=float(self.detector.saturation),
+            )
+            write_hcc(path, recording)
 
     def _field(self):
         rows, columns = self.emissivity.shape

@@ -127,7 +127,14 @@ def a_camera(folder: Path) -> None:
     def record(name: str, kelvins: Any, frames: int) -> Recording:
         radiance = np.broadcast_to(BAND.radiance(kelvins), (frames, *shape))
         counts, times = detector.counts(radiance, generator), np.arange(frames) / 600
-        written = Recording(counts, "counts", times, "simulated", 10e-6, detector.saturation)
+        written = Recording(
+            counts,
+            "counts",
+            times,
+            camera="simulated",
+            integration_time=10e-6,
+            saturation=detector.saturation,
+        )
         write_hcc(folder / name, written)
         return written
 

@@ -383,6 +383,26 @@ def test_draws_show_progress_and_can_be_cancelled(page):
     page.locator("#status", has_text="over 9 draws").wait_for()
 
 
+def test_the_image_is_corrected_while_the_controls_stay_live(page):
+    # Of large pixels all are corrected in a second.
+    turn(page, "Pixel pitch", "20")
+    page.wait_for_url("**camera.pitch=20*")
+    control(page, "images").select_option("correction")
+    page.locator("#status", has_text="Correcting the pixels").wait_for()
+    page.get_by_role("progressbar", name="Progress").wait_for()
+    turn(page, "Numerical aperture", "0.3")  # while it is being corrected
+    page.wait_for_url("**numerical_aperture=0.3*")
+    page.locator("#status", has_text=re.compile("^Corrected: ")).wait_for()
+    bars = page.get_by_role("table", name="Contributions to its standard uncertainty")
+    assert bars.locator(".bar").count() >= 4
+    assert re.search(r"°C ± \d", number(page, "corrected (95 %)").inner_text())
+    assert control(page, "error_image").is_hidden()
+    title = "(name) => Bokeh.documents[0].get_model_by_name(name).title.text"
+    assert page.evaluate(title, "error_figure") == "Half-width (95 %) / K"
+    control(page, "correction_image").select_option("true")
+    page.wait_for_function(f"() => ({title})('error_figure') === 'True temperature / °C'")
+
+
 def test_all_is_reached_by_the_keyboard_in_either_theme(page):
     reached = set()
     page.locator("button", has_text="Open…").focus()

@@ -10,6 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from chipglow import camera as cam
 from chipglow.analysis import error_images, headline
+from chipglow.camera.measuring import measurement_of, read_radiance
 from chipglow.io import write_scene
 from chipglow.report import write_report
 from chipglow.report.answer import answer, changes
@@ -53,10 +54,10 @@ def exposure(start=0.0):
 def test_without_a_detector_images_are_read_as_they_are(radiance):
     for psf in (None, cam.AnnularAperturePSF()):
         image = replace(PLAIN, psf=psf).form_image(radiance, SCENE)[None]
-        read, flags = replace(PLAIN, psf=psf).read(image, times(1))
+        read, flags = read_radiance(replace(PLAIN, psf=psf), image, times(1))
         assert read is image
         assert flags is None
-        measured = replace(PLAIN, psf=psf).measurement(image, times(1), SCENE)
+        measured = measurement_of(replace(PLAIN, psf=psf), image, times(1), SCENE)
         np.testing.assert_array_equal(measured.radiance, image)
 
 
@@ -67,7 +68,7 @@ def test_an_ideal_detector_gives_the_radiance_back_within_its_counts():
     full = calibration.sources[1] / 0.8
     one = full / ((1 << 14) - 1 - 400)  # a count
     radiance = np.linspace(0.01 * full, 0.99 * full, 1200).reshape(1, 30, 40)
-    read, flags = made.read(radiance, times(1))
+    read, flags = read_radiance(made, radiance, times(1))
     assert np.abs(read - radiance).max() < 1.2 * one
     error = (read - radiance).ravel()
     error -= np.polyval(np.polyfit(radiance.ravel(), error, 1), radiance.ravel())  # the sources'
@@ -82,7 +83,7 @@ def test_two_points_leave_nothing_of_the_patterns_of_a_linear_detector():
     left = {}
     for correction in ("two-point", "one-point", "none"):
         made = camera(*patterns, bits=24, correction=correction)
-        left[correction] = made.read(radiance, times(1))[0].std() / radiance.mean()
+        left[correction] = read_radiance(made, radiance, times(1))[0].std() / radiance.mean()
     assert left["two-point"] < 1e-6  # counts of 24 bits
     sources = made.calibration((30, 40)).sources
     beyond = (radiance.mean() - sources[0]) / radiance.mean()
@@ -96,7 +97,7 @@ def test_non_linearity_remains_between_the_points():
     """n (1 − f n / N) by a line through 0.1 N and 0.8 N, at half: f 0.4 · 0.3 / (1 − 0.9 f)."""
     made = camera(cam.NonLinearity(0.05), bits=24)
     full = made.calibration((4, 4)).sources[1] / 0.8
-    read, _ = made.read(np.full((1, 4, 4), 0.5 * full), times(1))
+    read, _ = read_radiance(made, np.full((1, 4, 4), 0.5 * full), times(1))
     expected = 0.5 + 0.05 * (0.5 - 0.1) * (0.8 - 0.5) / (1 - 0.9 * 0.05)
     np.testing.assert_allclose(read / full, expected, rtol=1e-5)
 
@@ -107,7 +108,7 @@ def test_flicker_noise_is_in_the_sources_frames_too():
     radiance = images(650.0, shape=(60, 80))
     for correction in ("one-point", "none"):
         made = camera(term, bits=20, correction=correction)
-        left[correction] = made.read(radiance, times(1))[0].std()
+        left[correction] = read_radiance(made, radiance, times(1))[0].std()
     # Each of the term's processes is alike after t in exp(-t / its time constant).
     apart = np.abs(np.subtract.outer(np.arange(32), np.arange(32)))[..., None] / 600
     kept = np.exp(-apart / term.time_constants(1 / 600)).mean()
@@ -119,7 +120,7 @@ def test_flicker_noise_is_in_the_sources_frames_too():
 def test_dark_electrons_leave_no_error_but_take_room():
     radiance = images(560.0)
     clear, dark = camera(bits=24), camera(cam.DarkCurrent(1e11), bits=24)
-    np.testing.assert_allclose(dark.read(radiance, times(1))[0], radiance, rtol=1e-5)
+    np.testing.assert_allclose(read_radiance(dark, radiance, times(1))[0], radiance, rtol=1e-5)
     hot = [one.calibration((30, 40)).sources[1] for one in (clear, dark)]
     assert hot[1] / hot[0] == pytest.approx(1 - 1e6 / 7e6, rel=1e-4)
 
@@ -129,7 +130,7 @@ def test_flags_say_what_is_saturated_dead_and_under_range():
     radiance = images(700.0)
     radiance[0, :10] = float(BAND.radiance(1200.0))
     radiance[0, 20:] = float(BAND.radiance(450.0))
-    measured = made.measurement(radiance, times(1), Raster(0, 0, 6e-6, 30, 40))
+    measured = measurement_of(made, radiance, times(1), Raster(0, 0, 6e-6, 30, 40))
     flags, kelvins = measured.flags[0], measured.radiance_temperature()[0]
     dead = made.detector.terms[0].mask((30, 40), made.detector.seed)
     assert dead.any()
@@ -174,11 +175,11 @@ def test_the_lower_range_limit_is_where_the_signal_is_so_many_times_its_noise():
 def test_noise_follows_from_the_seed_and_when_a_frame_begins():
     made = camera(cam.ShotNoise(), cam.GainPattern(0.02))
     radiance = images(650.0, 3)
-    first, _ = made.read(radiance, times(3))
-    np.testing.assert_array_equal(first, made.read(radiance, times(3))[0])
-    np.testing.assert_array_equal(first[1:2], made.read(radiance[:1], times(3)[1:2])[0])
+    first, _ = read_radiance(made, radiance, times(3))
+    np.testing.assert_array_equal(first, read_radiance(made, radiance, times(3))[0])
+    np.testing.assert_array_equal(first[1:2], read_radiance(made, radiance[:1], times(3)[1:2])[0])
     assert (first[0] != first[1]).mean() > 0.9
-    other, _ = made.redrawn(1).read(radiance, times(3))
+    other, _ = read_radiance(made.redrawn(1), radiance, times(3))
     assert (other != first).mean() > 0.9
     # Another noise, by the same detector.
     assert made.redrawn(1).calibration((30, 40)) is made.calibration((30, 40))
@@ -198,9 +199,9 @@ def test_a_microbolometer_lags_by_its_time_constant():
     starts = made.frame_times(0.0, 4)
     radiance = np.broadcast_to(np.array([1.0, 3.0, 3.0, 3.0])[:, None, None], (4, 2, 3))
     left = np.exp(-np.arange(4) / 60.0 / 10e-3)
-    read, _ = made.read(radiance, starts)
+    read, _ = read_radiance(made, radiance, starts)
     np.testing.assert_allclose(read[:, 0, 0], 3.0 - 2.0 * left, rtol=1e-12)
-    np.testing.assert_array_equal(made.read(radiance, 7.0 * starts)[0], radiance)
+    np.testing.assert_array_equal(read_radiance(made, radiance, 7.0 * starts)[0], radiance)
     (warning,) = made.form_measurement(exposure()).notes.warnings
     assert "thermal time constant is 10 ms" in warning
 
@@ -251,7 +252,7 @@ def test_a_study_chooses_it(tmp_path):
         hot=673.15,
         terms=(cam.GainPattern(0.02), cam.DarkCurrent(5e4), cam.ShotNoise(), cam.ReadNoise(500.0)),
     )
-    limit = cam.lower_range_limit(detector, cam.OperationPoint(BAND, 20e-6))
+    limit = cam.lower_range_limit(detector, cam.OperationPoint(BAND, integration_time=20e-6))
     expected = replace(
         cam.Camera.paper(), integration_time=20e-6, detector=detector, seed=7, lower_limit=limit
     )

@@ -8,7 +8,7 @@ import xarray as xr
 from command import refusal
 
 from chipglow import AnnularAperturePSF, Band, Camera, Estimate, Measurement, Raster
-from chipglow.camera import Flag, ImageFormation
+from chipglow.camera import Flag, ImageFormation, image_formation
 from chipglow.correction import (
     CorrectionFlag,
     Zone,
@@ -60,7 +60,7 @@ def scene(count=24, position=EDGE):
 
 def measured(kelvins, emissivity, samples, pixels, netd=0.5, seed=4, **settings):
     """Return the measurement of a scene, with noise in K at 600 K."""
-    light = CAMERA.image_formation(samples).forward(emissivity * BAND.radiance(kelvins))
+    light = image_formation(CAMERA, samples).forward(emissivity * BAND.radiance(kelvins))
     noise = netd * float(BAND.slope(600.0))
     light = light + np.random.default_rng(seed).normal(0.0, noise, light.shape)
     return Measurement.from_radiance(light[None], BAND, np.zeros(1), pixels, **settings)

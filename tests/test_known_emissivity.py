@@ -8,7 +8,7 @@ from command import chipglow, refusal
 from scipy.ndimage import gaussian_filter
 
 from chipglow import AnnularAperturePSF, Band, Camera, Estimate, Measurement, Raster
-from chipglow.camera import check_camera
+from chipglow.camera import check_camera, image_formation
 from chipglow.correction import (
     CorrectionFlag,
     correct_known,
@@ -41,7 +41,7 @@ NOISE = 0.2
 def seen(emissivity, kelvins, seed=1):
     """Return the measurement of an object with emissivities on samples, at one temperature."""
     light = emissivity * BAND.radiance(kelvins) + (1 - emissivity) * BAND.radiance(ROOM)
-    image = CAMERA.image_formation(FINE).forward(np.broadcast_to(light, FINE.shape))
+    image = image_formation(CAMERA, FINE).forward(np.broadcast_to(light, FINE.shape))
     noise = np.random.default_rng(seed).normal(0.0, NOISE * float(BAND.slope(600.0)), image.shape)
     return Measurement.from_radiance((image + noise)[None], BAND, np.zeros(1), PIXELS)
 

@@ -80,7 +80,7 @@ def test_many_files_replace_nothing_that_is_there(folder):
     ("sources", "out", "message"),
     [
         ("f0.npy sub/f0.npy", "nc", "nc/f0.nc: is the output of several files"),
-        ("f0.npy f1.npy", "low.npy", "low.npy: is not a folder"),
+        ("f0.npy f1.npy", "sub/f0.npy", "sub/f0.npy: is not a folder"),
         ("f0.npy", "low.npy", "low.npy: is also an input"),
         ("f0.npy none.npy f1.npy", "nc", "1 of 3 files cannot be used, the others are done; the"),
     ],

@@ -139,7 +139,7 @@ def test_a_calibration_comes_back_from_its_file(tmp_path):
         np.testing.assert_array_equal(again.parameters, first.parameters)
         np.testing.assert_array_equal(again.covariance, first.covariance)
         limits = (first.lowest, first.highest, 1e-5, "A")
-        assert (again.lowest, again.highest, again.integration_time, again.range_name) == limits
+        assert (again.lowest, again.highest, again.integration_time, again.range) == limits
         np.testing.assert_allclose(again.band.response.wavelengths, response.wavelengths)
 
 
@@ -260,7 +260,9 @@ def test_pixels_that_are_replaced_are_not_called_saturated():
     stuck[[2, 4], [3, 6]] = True
     signal = np.full((2, 6, 8), 900, np.uint16)
     signal[:, stuck] = 2**14 - 1
-    recording = Recording(signal, "radiance", np.arange(2.0), "camera", band=BAND, pitch=6e-6)
+    recording = Recording(
+        signal, "radiance", np.arange(2.0), camera="camera", band=BAND, pitch=6e-6
+    )
 
     def doubts(signal, bad):
         made = calibrate_recording(replace(recording, signal=signal), bad_pixels=bad)
@@ -382,7 +384,7 @@ def test_calibrate_prints_fits_and_writes_the_preferred(laboratory, tmp_path):
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert said.splitlines()[-2:] == [str(out), str(plot)]
     calibration = load_calibration(out)
-    assert (calibration.integration_time, calibration.range_name) == (1e-5, "A")
+    assert (calibration.integration_time, calibration.range) == (1e-5, "A")
     assert (calibration.lowest, calibration.highest) == pytest.approx((573.15, 1273.15))
     # Half a kelvin that all points have in common is there at every temperature.
     kelvins = np.array([700.0, 900.0, 1100.0])
@@ -588,7 +590,14 @@ def test_uniform_frames_of_another_format_say_themselves_what_they_are(tmp_path)
     np.save(tmp_path / "chip.npy", counts.astype(np.uint16))
     write_hcc(
         tmp_path / "even.hcc",
-        Recording(counts, "counts", np.arange(10) / 600.0, "camera", 1e-5, 16382.0),
+        Recording(
+            counts,
+            "counts",
+            np.arange(10) / 600.0,
+            camera="camera",
+            integration_time=1e-5,
+            saturation=16382.0,
+        ),
     )
     fields = [*CAMERA, f"flat_field.low={tmp_path / 'even.hcc'}"]
     assert uniform_counts(tmp_path / "chip.npy", fields)[0] == pytest.approx(

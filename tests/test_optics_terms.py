@@ -8,6 +8,7 @@ import pytest
 from scipy.special import ndtr
 
 from chipglow import camera as cam
+from chipglow.camera.measuring import measurement_of
 from chipglow.camera.optics.sampling import integrate, whole_raster
 from chipglow.scene import Raster
 from chipglow.study import Study, load_study, study_text
@@ -129,7 +130,7 @@ def test_form_image_stands_alone():
     camera, radiance = cam.Camera(psf=cam.GaussianPSF(8e-6)), rough()
     image = camera.form_image(radiance, SCENE)
     assert image.shape == camera.pixels(SCENE).shape
-    frames = camera.measurement(image[None], np.zeros(1), SCENE)
+    frames = measurement_of(camera, image[None], np.zeros(1), SCENE)
     np.testing.assert_array_equal(frames.radiance[0], image)
     for wrong in (radiance[1:], np.where(radiance > 890, np.nan, radiance), -radiance):
         with pytest.raises(ValueError, match="camera: radiance"):

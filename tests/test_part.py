@@ -61,6 +61,10 @@ def read(data):
     return adapter(Shelf).validate_python(data)
 
 
+FILE = {"folder": "."}
+"""Context of data from a file."""
+
+
 def read_from_file(data):
     return adapter(Shelf).validate_python(data, context={"folder": "."})
 
@@ -236,3 +240,16 @@ def test_the_schema_refuses_what_a_study_refuses(wrong):
         jsonschema.validate(wrong, json.loads(json_schema(Study)))
     with pytest.raises(ValueError, match=r"expected|did you mean"):
         Study(**wrong)
+
+
+def test_a_part_that_overrides_another_has_its_fields_or_none():
+    @dataclass(frozen=True)
+    class Change(Part, overrides=Shelf):
+        """Other numbers of a shelf."""
+
+    assert Change().declared() == Shelf.declared()
+    assert {getattr(Change(), name) for name in Change.declared()} == {None}
+    made = adapter(Change).validate_python({"width": "1.5 m", "boards": None}, context=FILE)
+    assert (made.width, made.boards) == (1.5, None)
+    with pytest.raises(ValueError, match=r"Change.width: 0 m, expected more than 0 m"):
+        Change(width=0.0)

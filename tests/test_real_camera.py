@@ -285,7 +285,7 @@ BAD = np.zeros((3, 3), bool)
         (lambda: replace_bad_pixels(np.ones((1, 3, 4)), np.zeros((2, 2), bool)), "expected 2 x 2"),
         (lambda: ImagePosition(tip=(np.nan, 0.0)), "tip"),
         (
-            lambda: calibrated(calibration=replace(LINE, range_name="A"), range_name="B"),
+            lambda: calibrated(calibration=replace(LINE, range="A"), range="B"),
             "for the range 'A', the recording has 'B'",
         ),
         (lambda: calibrated("radiance"), "holds radiance, expected counts"),

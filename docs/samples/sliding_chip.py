@@ -22,4 +22,11 @@ def chip() -> Recording:
         response=EnergyResponse(35.0), gain=0.02, terms=(ShotNoise(), ReadNoise(100.0))
     )
     counts = detector.counts(0.4 * BAND.radiance(np.array(frames)), np.random.default_rng(1))
-    return Recording(counts, "counts", np.arange(4) / 600, "simulated", 30e-6, 4094.0)
+    return Recording(
+        counts,
+        "counts",
+        np.arange(4) / 600,
+        camera="simulated",
+        integration_time=30e-6,
+        saturation=4094.0,
+    )

@@ -1,6 +1,11 @@
 """The virtual camera's error against its scene: images, places, distributions, causes."""
 
 from chipglow.analysis.attribution import AttributionPlan as AttributionPlan, attribute as attribute
+from chipglow.analysis.corrected import (
+    CorrectedPlace as CorrectedPlace,
+    CorrectedWindow as CorrectedWindow,
+    CorrectionPlan as CorrectionPlan,
+)
 from chipglow.analysis.cut import (
     Cut as Cut,
     CuttingForces as CuttingForces,

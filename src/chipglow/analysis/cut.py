@@ -8,6 +8,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis.corrected import CorrectedWindow
 from chipglow.analysis.heated import HeatedObject
 from chipglow.analysis.places import TOUCHING
 from chipglow.chip import (
@@ -63,6 +64,7 @@ class Cut:
     chip: ChipMetrics | None = None
     forces: CuttingForces | None = None
     heated: tuple[HeatedObject, ...] = ()
+    corrected: tuple[CorrectedWindow, ...] = ()
     overview: Scene | None = None
 
     @property

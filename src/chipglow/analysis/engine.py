@@ -11,6 +11,7 @@ import pandas as pd
 import xarray as xr
 
 from chipglow.analysis.attribution import attribute, read_attribution
+from chipglow.analysis.corrected import RAKE_FACE, SHEAR_BAND, CorrectedWindow, corrected_windows
 from chipglow.analysis.cut import Cut, Progress, cutting_forces, find_cut, lacking, spread_starts
 from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.heated import heated_objects
@@ -29,6 +30,7 @@ from chipglow.analysis.reductions import (
 )
 from chipglow.camera import Camera, Flag, GaussianPSF, Measurement
 from chipglow.camera.exposure import sparse_frames, surroundings_radiance
+from chipglow.camera.measuring import measurement_of
 from chipglow.chip import (
     NoContactError,
     NoShearBandError,
@@ -276,7 +278,9 @@ def analyse(
     schedule, cut, missing = _schedule(task)
     readings = read(scene, surfaces, fields, camera, schedule, lambda part: tell("camera", part))
     measurements = {
-        name: camera.redrawn(number).measurement(np.stack(images), schedule.starts, scene.raster)
+        name: measurement_of(
+            camera.redrawn(number), np.stack(images), schedule.starts, scene.raster
+        )
         for number, (name, images) in enumerate(readings.images.items())
     }
     middle = scene.frame_at(schedule.starts[schedule.shown] + task.duration / 2)
@@ -289,7 +293,7 @@ def analyse(
     variables |= _corrected(camera, variables) | _outside(schedule, readings, measurements)
     variables |= task.attempt("attribution", lambda: _attribution(task, readings)) or {}
     if cut is not None:
-        cut = _completed(task, cut)
+        cut = _completed(task, cut, measurements, schedule.shown)
         variables |= _cut_variables(task, cut, measurements)
     data = xr.Dataset(variables, attrs=_attributes(task, schedule, cut))
     data = data.set_coords([name for name in _COORDINATES if name in data])
@@ -436,8 +440,8 @@ def _places(task: _Task, middle: int) -> Iterator[Place]:
     yield from plan.all_places
 
 
-def _completed(task: _Task, cut: Cut) -> Cut:
-    """Return the cut with its chip, forces and heated objects; each of them may fail."""
+def _completed(task: _Task, cut: Cut, measurements: Mapping[str, Measurement], shown: int) -> Cut:
+    """Return the cut with chip, forces, heated objects and correction; each of them may fail."""
     task.tell("chip", 0.0)
     chip = task.attempt("chip metrics", lambda: chip_metrics(task.scene))
     task.tell("chip", 1.0)
@@ -448,7 +452,27 @@ def _completed(task: _Task, cut: Cut) -> Cut:
         lambda: heated_objects(task.camera, task.surfaces, tool, cut.band_width, spacing, textures),
     )
     forces = task.attempt("forces", lambda: cutting_forces(task.scene))
-    return replace(cut, chip=chip, forces=forces, heated=heated or (), overview=task.scene.overview)
+    cut = replace(cut, chip=chip, forces=forces, heated=heated or (), overview=task.scene.overview)
+    frames = {name: Measurement(one.data.isel(time=[shown])) for name, one in measurements.items()}
+    corrected = task.attempt("correction", lambda: _corrected_beside_edge(task, cut, frames))
+    return replace(cut, corrected=corrected or ())
+
+
+def _corrected_beside_edge(
+    task: _Task, cut: Cut, frames: Mapping[str, Measurement]
+) -> tuple[CorrectedWindow, ...]:
+    """Return the corrected parts of the shown exposure; none without a plan or a blur."""
+    plan = task.plan.correction
+    if plan is None or task.camera.psf is None:
+        return ()
+    task.tell("correction", 0.0)
+    read = {RAKE_FACE: task.plan.rake_chip, SHEAR_BAND: task.plan.band_chip}
+    windows = corrected_windows(
+        task.scene, task.camera, task.surfaces, frames, cut.segments[0], plan, read, cut.heated
+    )
+    corrected = tuple(windows)
+    task.tell("correction", 1.0)
+    return corrected
 
 
 def _scene_variables(

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from chipglow.analysis.attribution import AttributionPlan
+from chipglow.analysis.corrected import CorrectionPlan
 from chipglow.analysis.places import LinePlace, Place, PointPlace, RegionPlace
 from chipglow.camera import ReferenceKind
 from chipglow.laboratory.emissivity import RegionSection
@@ -26,6 +27,9 @@ class Plan(Part):
         shear band. Otherwise the scene is analysed exposure by exposure.
     attribution : AttributionPlan, optional
         Effects among which the errors of the shown exposure are divided; None: they are not.
+    correction: CorrectionPlan, optional
+        What is known if the shown exposure of a cut is corrected beside the cutting edge; None: it
+        is not corrected.
 
     Raises
     ------
@@ -96,6 +100,7 @@ class Plan(Part):
     places: tuple[Place, ...] = ()
     cut: bool = True
     attribution: AttributionPlan | None = None
+    correction: CorrectionPlan | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -11,6 +11,7 @@ import xarray as xr
 from chipglow.camera import Camera
 from chipglow.camera.chain import ExposedChain, chains_in_bands, expose_chains
 from chipglow.camera.effect import EVERY, Effect
+from chipglow.camera.measuring import read_radiance
 from chipglow.quantities import Array
 from chipglow.radiometry import RatioThermometer
 from chipglow.scene import Material, Raster, Scene, sample
@@ -138,7 +139,7 @@ def _in_pixels(chain: ExposedChain, on: frozenset[Effect]) -> Array:
     radiance = chain.radiance(on)
     if not on & CAUSES["noise"]:
         return radiance
-    read, _ = chain.camera.read(radiance[None], np.array([chain.exposure.start]))
+    read, _ = read_radiance(chain.camera, radiance[None], np.array([chain.exposure.start]))
     return np.asarray(read[0], np.float64)
 
 

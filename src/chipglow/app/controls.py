@@ -49,6 +49,25 @@ ERROR_IMAGES: Final[Mapping[str, str]] = {
     "texture": "Error by texture",
 }
 
+ERRORS, CORRECTION = "error", "correction"
+SHOWN_IMAGES: Final[Mapping[str, str]] = {ERRORS: "Scene and error", CORRECTION: "Correction"}
+"""What the three images are: scene, measured and error; or measured, corrected and one more."""
+
+CORRECTION_IMAGES: Final[Mapping[str, str]] = {
+    "half-width": "Half-width (95 %)",
+    "true": "True temperature",
+    "error": "Correction error",
+}
+
+_ONLY_WITH: Final[Mapping[str, str]] = {
+    "scene_image": ERRORS,
+    "error_image": ERRORS,
+    "analysis.reference": ERRORS,
+    "correction_image": CORRECTION,
+    "emissivity_uncertainty": CORRECTION,
+}
+"""Controls that have an effect on one kind of images alone."""
+
 REFERENCES: Final[Mapping[str, str]] = {
     "maximum": "Radiance maximum",
     "mean": "Radiance mean",
@@ -83,6 +102,11 @@ class ShownStudy(Study):
     start: Annotated[float, Parameter("Start of the exposure.", INSTANT)] = 0.0
     scene_image: Annotated[str, Parameter("Image of the scene.")] = "temperature"
     error_image: Annotated[str, Parameter("Image of the error.")] = "total"
+    images: Annotated[str, Parameter("Kind of images.")] = ERRORS
+    correction_image: Annotated[str, Parameter("Image of the correction.")] = "half-width"
+    emissivity_uncertainty: Annotated[
+        float, Parameter("Standard uncertainty of the mean emissivity.", least=0.0, under=1.0)
+    ] = 0.01
 
     def _check_camera(self) -> None:
         """Its cut need not suit the camera: the scene exists."""
@@ -170,9 +194,11 @@ class Control:
 
 TABLE: Final = (
     Control("start", "Exposure begins", "Scene"),
+    Control("images", "Images", "Scene"),
     Control("scene_image", "Scene image", "Scene"),
     Control("error_image", "Error image", "Scene"),
     Control("analysis.reference", "Error against", "Scene"),
+    Control("correction_image", "Third image", "Scene"),
     Control("camera.band.0", "Band from", "Camera", 0.8, 8.0, 0.1),
     Control("camera.band.1", "Band to", "Camera", 1.0, 14.0, 0.1),
     Control("camera.pitch", "Pixel pitch", "Camera", 1.0, 30.0, 0.5),
@@ -198,6 +224,7 @@ TABLE: Final = (
         "Shear band, std. dev.", "Surface", 0.0, 0.2, 0.005,
     ),
     Control("surface.emissivity", "Uniform emissivity", "Surface", 0.05),
+    Control("emissivity_uncertainty", "Uncertainty (k = 1)", "Surface", 0.0, 0.1, 0.005),
     Control("seed", "Seed", "Surface", 0, 4000, 1),
     Control("camera.reflected", "Reflected temperature", "Surface", 0.0, 300.0, 5.0),
 )  # fmt: skip
@@ -281,6 +308,14 @@ class Controls:
             for path, row in self.rows.items()
             if row.options or _has(state.study, row.setting)
         }  # fmt: skip
+
+    def shown(self, state: State) -> dict[str, str]:
+        """Return the texts of the controls that have an effect, as their fields show them."""
+        return {
+            path: self.rows[path].shown(text)
+            for path, text in self.values(state).items()
+            if _ONLY_WITH.get(path, state.study.images) == state.study.images
+        }
 
     def ranges(self, state: State) -> dict[str, list[float]]:
         """Return what the scene allows at a state: the stops of the start, the exposure's ends.
@@ -398,6 +433,8 @@ def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
     words = {
         "scene_image": scene_images,
         "error_image": ERROR_IMAGES,
+        "images": SHOWN_IMAGES,
+        "correction_image": CORRECTION_IMAGES,
         "analysis.reference": REFERENCES,
         "camera.psf_order": {"detector": "Blur on the pixels", "optics": "Blur on the scene"},
     }

@@ -1,5 +1,6 @@
 """The figures of the page: images with linked ranges and cursors, and temperatures along lines."""
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -21,6 +22,7 @@ from bokeh.plotting import figure
 from chipglow.app.controls import CURSOR, LINES
 from chipglow.app.pictures import Drawn, Panel, Picture
 from chipglow.drawing.scales import HEAT, PLAIN, SIGNED
+from chipglow.quantities import Array
 from chipglow.scene import Raster, Tool
 
 MICRONS: Final = 1e6
@@ -42,6 +44,7 @@ _VOID, _GRID = (128, 128, 128, 0.2), (128, 128, 128, 0.35)
 LINE_COLOURS: Final = {"rake_line": "#56B4E9", "band_line": "#E69F00"}
 _MEASURED: Final = "#2b7fd0"
 _REFERENCE: Final = "#7d858f"
+_CORRECTED: Final = "#c2571a"
 
 _BORDER: Final = 46
 _SIDE: Final = 180
@@ -103,7 +106,7 @@ class Line:
         self.figure = one = _figure(name, title, 150)
         curves = ("measured", "reference") if with_reference else ("measured",)
         source = ColumnDataSource(
-            {"along": [], "measured": [], "reference": []}, name=f"{name}_values"
+            {"along": [], "measured": [], "reference": [], "corrected": []}, name=f"{name}_values"
         )
         self.band = ColumnDataSource({"along": [], "low": [], "high": []})
         self.under_range = BoxAnnotation(
@@ -118,7 +121,9 @@ class Line:
         one.add_layout(Span(dimension="height", line_color=colour, line_width=3, location=0))
         for mark in (self.under_range, self.face, self.face_label):
             one.add_layout(mark)
-        one.varea("along", "low", "high", source=self.band, fill_alpha=0.25, color=_MEASURED)
+        self.shade = one.varea(
+            "along", "low", "high", source=self.band, fill_alpha=0.25, color=_MEASURED
+        )
         looks = {
             "reference": {"line_dash": "dashed", "line_color": _REFERENCE},
             "measured": {"line_color": _MEASURED},
@@ -127,11 +132,18 @@ class Line:
             one.line("along", key, source=source, line_width=2, legend_label=key, **looks[key])
             for key in reversed(curves)
         ]
+        self.corrected = one.line(
+            "along", "corrected", source=source, line_width=2, legend_label="corrected",
+            line_color=_CORRECTED, visible=False,
+        )  # fmt: skip
         tips = [("distance", "@along{0.0} µm"), *((key, f"@{key}{{0.0}} °C") for key in curves)]
         one.legend[0].update(
             orientation="horizontal", padding=0, margin=0, spacing=10, glyph_height=12,
             label_text_font_size="11px", border_line_color=None, background_fill_color=None,
         )  # fmt: skip
+        *others, self.corrected_item = one.legend[0].items
+        self.reference_item = others[0] if with_reference else None
+        self.corrected_item.visible = False
         one.add_layout(one.legend[0], "above")
         one.add_tools(HoverTool(tooltips=tips, mode="vline", renderers=drawn[-1:]))
         one.x_range.range_padding = 0.02
@@ -148,6 +160,17 @@ class Line:
         self.face_label.update(x=crossing or 0.0, visible=crossing is not None)
         if len(self.band.data["along"]):
             self.band.data = {"along": [], "low": [], "high": []}
+
+    def show_corrected(self, curves: Mapping[str, Array]) -> None:
+        """Show or hide the corrected temperature, and shade its interval."""
+        is_known = "corrected" in curves
+        self.corrected.visible = self.corrected_item.visible = is_known
+        if self.reference_item is not None:
+            self.reference_item.label = {"value": "true" if is_known else "reference"}
+        self.shade.glyph.fill_color = _CORRECTED if is_known else _MEASURED
+        if is_known:
+            inside = np.isfinite(curves["low"]) & np.isfinite(curves["high"])
+            self.band.data = {key: curves[key][inside] for key in ("along", "low", "high")}
 
 
 class Figures:
@@ -186,6 +209,7 @@ class Figures:
         for name, line in self.lines.items():
             highest = np.nanmax([*picture.lines[name]["measured"], -np.inf])
             line.show(picture.lower_limit, float(highest), picture.crossings.get(name))
+            line.show_corrected(picture.lines[name])
 
     def show_drawn(self, picture: Picture, drawn: Drawn) -> None:
         for name, line in self.lines.items():
@@ -193,6 +217,7 @@ class Figures:
             known = np.isfinite(draws).all(axis=0)
             low, high = draws[:, known].min(axis=0), draws[:, known].max(axis=0)
             line.band.data = {"along": along[known], "low": low, "high": high}
+            line.shade.glyph.fill_color = _MEASURED
 
     def set_theme(self, theme: str) -> None:
         text = TEXT[theme]

@@ -32,7 +32,9 @@ MOST_UPLOADED: Final = 512 * 1024**2
 
 _MOST_OPEN: Final = 8
 
-SHOWN: Final = ("start", "scene_image", "error_image")
+SHOWN: Final = (
+    "start", "images", "scene_image", "error_image", "correction_image", "emissivity_uncertainty",
+)  # fmt: skip
 """Settings of the page that a study does not have."""
 
 SHOWN_LINE: Final = "# Shown in chipglow app: "

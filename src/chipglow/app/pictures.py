@@ -16,6 +16,8 @@ from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.images import errors_of, exposed_chain, parts_of
 from chipglow.analysis.read import Schedule, SurfacePlaces, read
 from chipglow.app.controls import (
+    CORRECTION,
+    CORRECTION_IMAGES,
     CURSOR,
     ERROR_IMAGES,
     LINES,
@@ -28,6 +30,7 @@ from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.camera.chain import ExposedChain
 from chipglow.camera.exposure_kernels import Check
 from chipglow.camera.reference import TRUE
+from chipglow.correction import Correction, correct, observed_scene, scene_truth, surroundings_of
 from chipglow.drawing.scales import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
 from chipglow.io import StoredScene
 from chipglow.quantities import Array, Brief
@@ -54,6 +57,18 @@ _ROLLING: Final = (*_EXPOSURE, "camera.pitch", "camera.offset")
 """Beginnings of the paths of controls that change surface and exposure."""
 
 
+_HALF: Final = 24
+"""Half the side in pixels of the part that is corrected: a correction takes 3 ms a pixel."""
+
+_LINE_OF: Final = {
+    "reference": "true", "corrected": "temperature", "low": "lower", "high": "upper",
+}  # fmt: skip
+"""Variables of a correction that are drawn along lines, by the names of their curves."""
+
+_STEP: Final = 16
+"""Pixels by which this part follows the cursor, so that few moves need a new correction."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Panel(Brief):
     """An image as a figure shows it, NaN where it is grey."""
@@ -64,6 +79,49 @@ class Panel(Brief):
     raster: Raster
     limits: tuple[float, float]
     colours: str
+
+
+@dataclass(frozen=True)
+class CorrectedPixel:
+    """A corrected pixel: temperatures in K, expanded uncertainty, and uncertainty by source."""
+
+    temperature: float
+    expanded_uncertainty: float
+    true: float
+    contributions: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Corrected(Brief):
+    """A part of an image, corrected, and its true temperature in K."""
+
+    correction: Correction
+    true: Array
+
+    def image(self, name: str) -> Array:
+        """Return one of `CORRECTION_IMAGES`, or the corrected temperature, in K."""
+        data = self.correction.data.isel(time=0)
+        temperature = np.asarray(data["temperature"].values, np.float64)
+        if name == "half-width":
+            return np.asarray((data["upper"].values - data["lower"].values) / 2)
+        shown = np.where(np.isnan(temperature), nan, self.true)
+        images = {"corrected": temperature, "true": shown, "error": temperature - self.true}
+        return images[name]
+
+    def at(self, place: tuple[float, float]) -> CorrectedPixel | None:
+        """Return the pixel at x and y in m; None without a corrected temperature."""
+        try:
+            estimate = self.correction.at(place)
+        except ValueError:
+            return None
+        budget = self.correction.budget(place)
+        true = float(nearest(self.true, self.correction.raster, place))
+        return CorrectedPixel(
+            float(estimate.values),
+            float(estimate.expanded_uncertainty()),
+            true,
+            dict(zip(budget.cause, budget.standard_uncertainty, strict=True)),
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -82,6 +140,7 @@ class Picture(Brief):
     parts: Callable[[], xr.Dataset] | None = None  # computes the `error_parts`
     absent: Mapping[str, str] = field(default_factory=dict)  # why error images are 0 everywhere
     reference: str = ""  # label of the reference
+    corrected: Corrected | None = None
 
     @property
     def lower_limit(self) -> float | None:
@@ -159,11 +218,45 @@ class SceneModel:
                 low = low if camera.lower_limit is None else camera.lower_limit - KELVIN
                 limits = min(least, low), max(most, high)
             panels |= {name: replace(panels[name], limits=limits) for name in ("scene", "measured")}
-        return Picture(
+        picture = Picture(
             state, raster, data, panels, _lines(state, raster, data),
             _crossings(state, scene.tool), quick, camera, exposure, parts, _absent(state, surface),
             reference,
         )  # fmt: skip
+        if state.study.images != CORRECTION:
+            return picture
+        known = self._caches["correction"].get(self._correction_key(state))
+        return _with_correction(picture, known)
+
+    def corrected(self, picture: Picture, check: Check) -> Picture:
+        """Return an exact picture with its corrected image around the cursor."""
+        assert picture.camera and picture.exposure
+        state, camera, exposure = picture.state, picture.camera, picture.exposure
+
+        def make() -> Corrected:
+            scene, surface = self._on(state, quick=False)
+            start, known = exposure.start, state.study.emissivity_uncertainty
+            observed = observed_scene(scene, camera, surface, start, known)
+            check()
+            data = camera.form_measurement(exposure).data
+            rows, columns = _around_cursor(state, picture.raster)
+            result = correct(
+                Measurement(data.isel(y=rows, x=columns)),
+                camera,
+                observed,
+                surroundings=surroundings_of(camera),
+                progress=lambda done: check(),
+            )
+            return Corrected(result, scene_truth(result, scene, camera, observed, start))
+
+        self._kept(8, "correction", self._correction_key(state), make)
+        return self.picture(state)
+
+    def _correction_key(self, state: State) -> Hashable:
+        camera = self._camera(state, self.scene)
+        rows, columns = _around_cursor(state, camera.pixels(self.scene.raster))
+        window = rows.start, columns.start
+        return self._exposure_key(state), camera, state.study.emissivity_uncertainty, window
 
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the numbers at the cursor in K: those of the `error_parts`, and of the scene."""
@@ -408,6 +501,60 @@ def with_samples(scene: Scene, count: int, fewer_frames: bool = False) -> Scene:
     if step < 2 or not isinstance(scene, StoredScene) or scene.lattice is None:
         return scene
     return scene.coarser(step, step if fewer_frames else 1)
+
+
+def _around_cursor(state: State, pixels: Raster) -> tuple[slice, slice]:
+    """Return the rows and columns of pixels that are corrected; the cursor is well inside."""
+    x, y = state.cursor
+    places = (pixels.top - y) / pixels.spacing, (x - pixels.left) / pixels.spacing
+    middles = (round(place / _STEP) * _STEP for place in places)
+    return tuple(  # type: ignore[return-value]
+        slice(max(middle - _HALF, 0), min(middle + _HALF, count))
+        for middle, count in zip(middles, pixels.shape, strict=True)
+    )
+
+
+def _with_correction(picture: Picture, corrected: Corrected | None) -> Picture:
+    """Return the picture with measured, corrected and one more image; grey where not known."""
+    shown, before = picture.state.study.correction_image, picture.panels
+    raster = corrected.correction.raster if corrected else picture.raster
+    unknown = np.full(raster.shape, nan)
+    temperature = corrected.image("corrected") - KELVIN if corrected else unknown
+    limits = before["measured"].limits
+    if np.isfinite(temperature).any():
+        limits = min(limits[0], np.nanmin(temperature)), max(limits[1], np.nanmax(temperature))
+    title, third = (
+        CORRECTION_IMAGES[shown],
+        unknown if corrected is None else corrected.image(shown),
+    )
+    if shown == "true":
+        last = Panel(title, "°C", third - KELVIN, raster, limits, HEAT)
+    elif shown == "error":
+        last = _error_panel(title, third, raster)
+    else:
+        last = Panel(title, "K", third, raster, (0.0, round_limit(third, 98, 5.0)), PLAIN)
+    panels = {
+        "scene": replace(before["measured"], limits=limits),
+        "measured": Panel("Corrected temperature", "°C", temperature, raster, limits, HEAT),
+        "error": last,
+    }
+    lines = {
+        name: curves | _corrected_line(picture, corrected, name)
+        for name, curves in picture.lines.items()
+    }
+    return replace(picture, panels=panels, lines=lines, corrected=corrected)
+
+
+def _corrected_line(picture: Picture, corrected: Corrected | None, name: str) -> dict[str, Array]:
+    """Return the corrected temperature along a line, its interval and the true one in °C."""
+    if corrected is None:
+        return {"reference": np.full_like(picture.lines[name]["along"], nan)}
+    data = corrected.correction.data.isel(time=0).assign(true=(("y", "x"), corrected.true))
+    line = picture.state.line(name).line(picture.raster.spacing)
+    return {
+        key: sample(data[variable].values, corrected.correction.raster, line.points) - KELVIN
+        for key, variable in _LINE_OF.items()
+    }
 
 
 def _at(data: xr.Dataset, raster: Raster, at: tuple[float, float]) -> dict[str, float]:

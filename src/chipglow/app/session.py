@@ -6,7 +6,7 @@ from dataclasses import replace
 from threading import Event, Lock, Thread
 from typing import Final, Generic, TypeAlias, TypeVar
 
-from chipglow.app.controls import State, Texts
+from chipglow.app.controls import CORRECTION, State, Texts
 from chipglow.app.pictures import Model, Picture, SceneModel
 
 PAUSE: Final = 0.15
@@ -160,8 +160,20 @@ class Session:
             work.pause(PAUSE if model.coarse else 0.0)
         numbers = model.numbers(picture)
         self._notify("numbers", picture, numbers, {})
-        if contributions := model.contributions(picture, work.check):
+        if state.study.images == CORRECTION:
+            self._correct(picture, numbers)
+        elif contributions := model.contributions(picture, work.check):
             self._notify("numbers", picture, numbers, contributions)
+
+    def _correct(self, picture: Picture, numbers: dict[str, float]) -> None:
+        """Send the picture again with the corrected image, unless it has it already."""
+        assert isinstance(self.model, SceneModel)
+        if picture.corrected is not None:
+            return
+        self._notify("correcting")
+        corrected = self.model.corrected(picture, self._pictures.check)
+        self._send(corrected)
+        self._notify("numbers", corrected, numbers, {})
 
     def _send(self, picture: Picture) -> None:
         """Send a picture as soon as the page has painted the one before."""

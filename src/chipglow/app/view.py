@@ -22,12 +22,13 @@ from panel.custom import Children, JSComponent
 from chipglow import __version__
 from chipglow.analysis.attribution import AttributionReference
 from chipglow.analysis.images import PARTS
-from chipglow.app.controls import ERROR_IMAGES, Texts
+from chipglow.app.controls import CORRECTION, ERROR_IMAGES, Texts
 from chipglow.app.figures import TEXT, Figures
 from chipglow.app.opening import MOST_UPLOADED, OpenFiles
 from chipglow.app.pictures import Drawn, Model, Picture, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
 from chipglow.drawing.scales import KELVIN
+from chipglow.quantities import Array
 from chipglow.quantities.format import quantity_text, readable, rounded_text, uncertain_decimals
 
 _FOLDER: Final = Path(__file__).parent
@@ -217,10 +218,7 @@ class View:
         self.figures.show(picture)
         self._say(*self._described(picture))
         # The page draws the curves after the images: that halves the time to the images.
-        lines = {
-            f"{name}_values": {key: curve.tolist() for key, curve in curves.items()}
-            for name, curves in picture.lines.items()
-        }
+        lines = {f"{name}_values": _columns(curves) for name, curves in picture.lines.items()}
         content = {"number": number, "lines": lines, "absent": picture.absent}
         self._send("picture", content | {"quick": picture.quick})
 
@@ -242,6 +240,12 @@ class View:
             limit = picture.lower_limit
             above = "" if limit is None else f", which begins at {limit:.0f} °C"
             return f"No pixel is within the camera's range{above}.", "error"
+        if picture.corrected is not None:
+            raster = picture.corrected.correction.raster
+            size = f"{raster.columns} × {raster.rows}"
+            return f"Corrected: {size} pixels around the cursor.", ""
+        if picture.state.study.images == CORRECTION:
+            return "Exact picture; the correction follows.", "busy"
         if shown in picture.absent:
             return f"{ERROR_IMAGES[shown]} is 0 everywhere: {picture.absent[shown]}.", ""
         took = f", {1e3 * (perf_counter() - self._began):.0f} ms after the last change"
@@ -253,6 +257,7 @@ class View:
         x, y = picture.state.cursor
         parts = {name: numbers[name] for name in (*PARTS, "texture") if name in numbers}
         template = _TEMPLATES.get_template("numbers.html")
+        corrected = picture.corrected and picture.corrected.at(picture.state.cursor)
         html = template.render(
             numbers=numbers,
             texts=_texts(numbers),
@@ -263,8 +268,17 @@ class View:
             percent=_bars(parts),
             contributions=contributions,
             widths=_bars(contributions),
+            is_correction=picture.state.study.images == CORRECTION,
+            is_corrected=picture.corrected is not None,
+            corrected=corrected,
+            shares=_bars(corrected.contributions if corrected else {}),
         )
         self._send("numbers", html)
+
+    def _show_correcting(self) -> None:
+        self._say(
+            "Correcting the pixels around the cursor; this takes seconds.", "busy", progress=None
+        )
 
     def _show_drawn(self, drawn: Drawn) -> None:
         if drawn.state != self.session.state or self._picture is None:
@@ -291,10 +305,9 @@ class View:
 
     def _put_values(self) -> None:
         session, controls = self.session, self.session.model.controls
-        values = controls.values(session.state)
         content = {
             "n": self._handled,
-            "values": {path: controls.rows[path].shown(text) for path, text in values.items()},
+            "values": controls.shown(session.state),
             "ranges": controls.ranges(session.state),
             "can_undo": session.can_undo,
             "can_redo": session.can_redo,
@@ -324,6 +337,13 @@ class View:
             self._reported(show)
         finally:
             document.unhold()
+
+
+def _columns(curves: Mapping[str, Array]) -> dict[str, list[float]]:
+    """Return the curves along a line as the page draws them."""
+    unknown = np.full_like(curves["along"], np.nan)
+    drawn = {"corrected": unknown, **curves}
+    return {key: curve.tolist() for key, curve in drawn.items() if key not in ("low", "high")}
 
 
 def _bars(values: Mapping[Any, float]) -> dict[Any, float]:

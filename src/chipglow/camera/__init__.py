@@ -15,17 +15,17 @@ from chipglow.camera.calibration import (
     LinearCalibration as LinearCalibration,
     SakumaHattori as SakumaHattori,
 )
-from chipglow.camera.camera import (
-    PAPER_LIMIT as PAPER_LIMIT,
-    Camera as Camera,
-    CameraSettings as CameraSettings,
-    ChipglowWarning as ChipglowWarning,
-)
+from chipglow.camera.camera import PAPER_LIMIT as PAPER_LIMIT, Camera as Camera
 from chipglow.camera.chain import (
     Chain as Chain,
     ExposedChain as ExposedChain,
     PixelReading as PixelReading,
     read_temperature as read_temperature,
+)
+from chipglow.camera.description import (
+    CameraDescription as CameraDescription,
+    CameraSettings as CameraSettings,
+    ChipglowWarning as ChipglowWarning,
 )
 from chipglow.camera.detector.detector import Detector as Detector
 from chipglow.camera.detector.flat_field import (
@@ -72,6 +72,7 @@ from chipglow.camera.exposure import (
     expose as expose,
     frame_weights as frame_weights,
 )
+from chipglow.camera.image import image_formation as image_formation
 from chipglow.camera.measurement import (
     UNUSABLE as UNUSABLE,
     Flag as Flag,

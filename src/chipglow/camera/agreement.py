@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from chipglow.camera.camera import Camera
+from chipglow.camera.description import CameraDescription
 from chipglow.camera.measurement import Measurement
 from chipglow.quantities.units import LENGTH, Quantity
 
@@ -19,7 +19,7 @@ def alike(one: float, other: float) -> bool:
     return abs(one - other) <= _TOLERANCE * abs(other)
 
 
-def check_camera(measurement: Measurement, camera: Camera) -> None:
+def check_camera(measurement: Measurement, camera: CameraDescription) -> None:
     """Raise a ValueError if band, pitch or fill factor of a measurement are not the camera's."""
     band = measurement.band
     check_value("lower limit of the band", band.lower, camera.band.lower, LENGTH)

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.camera.recording import PlanckConversion
+from chipglow.camera.recording import MeasuringRange, PlanckConversion
 from chipglow.quantities import Array, Brief
 from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.radiometry import Band
@@ -76,7 +76,7 @@ class CalibrationErrors(Brief):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Calibration(ABC):
+class Calibration(MeasuringRange, ABC):
     """Meaning of a camera's counts; `description` says what it is."""
 
     description: ClassVar[str]
@@ -85,10 +85,6 @@ class Calibration(ABC):
     """Lowest valid radiance temperature in K."""
     highest: float = inf
     """Radiance temperature in K up to which it holds."""
-    integration_time: float | None = None
-    """Integration time in s for which it holds."""
-    range_name: str | None = None
-    """The camera's measuring range for which it holds, as its maker calls it."""
     warnings: tuple[str, ...] = ()
     """Warnings, as sentences."""
 
@@ -116,6 +112,7 @@ class FittedCalibration(Calibration):
     """Covariance of the fit and of errors common to the blackbodies, shape (n, n)."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not COLDEST <= self.lowest < self.highest <= HOTTEST:
             raise ValueError(
                 f"calibration: lowest is {self.lowest:g} K and highest {self.highest:g} K, "

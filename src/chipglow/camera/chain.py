@@ -12,7 +12,9 @@ from chipglow.camera.camera import Camera
 from chipglow.camera.effect import EVERY, Effect
 from chipglow.camera.exposure import Exposure, View, expose
 from chipglow.camera.exposure_kernels import Check
+from chipglow.camera.image import form_image, image_formation
 from chipglow.camera.measurement import range_flags
+from chipglow.camera.measuring import read_radiance
 from chipglow.camera.optics.convolution import blur
 from chipglow.camera.optics.image_formation import ImageFormation
 from chipglow.camera.optics.psf import PointSpreadFunction
@@ -93,7 +95,7 @@ class Chain:
     @cached_property
     def image_formation(self) -> ImageFormation:
         """The linear map from the radiance of the scene's samples to that of the pixels."""
-        return self.camera.image_formation(self.scene.raster)
+        return image_formation(self.camera, self.scene.raster)
 
     def forward(self, radiance: ArrayLike) -> Array:
         """Return the radiance of the pixels in W/(m² sr), from that of the samples, each (y, x)."""
@@ -345,7 +347,7 @@ def expose_apart(
 
 def read_temperature(camera: Camera, radiance: Array, start: float) -> PixelReading:
     """Return what a camera reads of the radiance of its pixels, (y, x), at `start` in s."""
-    read, flags = camera.read(radiance[None], np.array([start]))
+    read, flags = read_radiance(camera, radiance[None], np.array([start]))
     kelvins = np.asarray(camera.band.temperature(read[0]), dtype=np.float64)
     known = None if flags is None else flags[0]
     return PixelReading(kelvins, range_flags(kelvins, camera.lower_limit, known))
@@ -383,7 +385,7 @@ def _formed(
     if is_common and psf and camera.psf_order == "optics" and "footprint" not in psf.includes:
         assert blurred is not None
         radiance, camera = blurred(psf), replace(camera, psf=None)
-    return camera.form_image(radiance, exposure.raster, gather)
+    return form_image(camera, radiance, exposure.raster, gather)
 
 
 def _read(formed: Callable[..., Array], start: float, camera: Camera, *how: object) -> PixelReading:

@@ -1,12 +1,13 @@
 """Contents of a camera file, before calibration."""
 
 from dataclasses import dataclass, field
-from typing import Any, Final, Literal, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import Array, Brief, Parameter, Part
+from chipglow.quantities.units import LENGTH, TIME
 from chipglow.radiometry import Band, ObjectParameters
 from chipglow.text import Notes
 
@@ -42,8 +43,45 @@ class PlanckConversion:
         return np.where((signal > 0) & (logarithm > 0), temperature, np.nan)
 
 
+@dataclass(frozen=True, kw_only=True)
+class MeasuringRange(Part):
+    """Setting of a camera for which its counts have one meaning."""
+
+    integration_time: Annotated[
+        float | None, Parameter("Integration time; none: not stated.", TIME)
+    ] = None
+    range: Annotated[
+        str | None, Parameter("Measuring range of the camera by its name; none: not stated.")
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingSettings(MeasuringRange):
+    """Statements on a `Recording`, of its file or of who describes it."""
+
+    camera: Annotated[
+        str | None, Parameter("Name of the camera, for readers; none: not stated.")
+    ] = None
+    pitch: Annotated[
+        float | None, Parameter("Distance between pixels on the object; none: not stated.", LENGTH)
+    ] = None
+    fill_factor: Annotated[
+        float | None,
+        Parameter(
+            "Portion of a pixel's square that takes light; none: not stated, 1 is assumed for an "
+            "edge.",
+            over=0.0,
+            most=1.0,
+        ),
+    ] = None
+    saturation: Annotated[
+        float | None,
+        Parameter("Largest number in the file that is not saturated; none: not stated."),
+    ] = None
+
+
 @dataclass(frozen=True, repr=False)
-class Recording(Brief):
+class Recording(Brief, RecordingSettings):
     """Frames as a camera wrote them."""
 
     signal: NDArray[Any]
@@ -53,17 +91,10 @@ class Recording(Brief):
     by the camera with its object parameters."""
     times: Array
     """Time of each frame in s, shape (time,)."""
-    camera: str
-    """Name of the camera."""
-    integration_time: float | None = None
-    """Integration time in s."""
-    saturation: float | None = None
-    """Largest unsaturated signal."""
+    camera: str = field(default="unknown", kw_only=True)
     least_signal: float | None = None
     """Smallest signal within the measuring range."""
     band: Band | None = None
-    pitch: float | None = None
-    """Distance between pixels on the object in m."""
     position: tuple[float, float] | None = None
     """Left and upper edge of the image in m, in coordinates that the file states."""
     stored: str = "y, x"
@@ -72,16 +103,13 @@ class Recording(Brief):
     """Factory conversion of counts."""
     object_parameters: ObjectParameters | None = None
     """Object parameters set in the camera; temperatures depend on them, counts do not."""
-    range_name: str | None = None
-    """Manufacturer's name of the measuring range."""
-    fill_factor: float | None = None
-    """Sensitive fraction of the pixel area."""
     stated_band: Band | None = None
     """Band in the file, whose unit is assumed: it is compared, not used."""
     notes: Notes = field(default_factory=Notes)
     """Assumptions and warnings of reading the file, and its other statements."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.signal.ndim != 3 or 0 in self.signal.shape:
             raise ValueError(
                 f"recording: signal must have shape (time, y, x), not {self.signal.shape}"
@@ -93,14 +121,6 @@ class Recording(Brief):
         if self.times.shape != self.signal.shape[:1]:
             raise ValueError(
                 f"recording: {self.times.size} times for {len(self.signal)} frames, must be equal"
-            )
-        for name in ("integration_time", "pitch"):
-            value = getattr(self, name)
-            if value is not None and not 0 < value < np.inf:
-                raise ValueError(f"recording: {name} must be positive, not {value!r}")
-        if self.fill_factor is not None and not 0 < self.fill_factor <= 1:
-            raise ValueError(
-                f"recording: fill_factor must be above 0 and at most 1, not {self.fill_factor!r}"
             )
 
     def saturated(self) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ from typing import Final, Literal, TypeAlias, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.camera import Camera
+from chipglow.camera.description import CameraDescription
 from chipglow.camera.exposure import Exposure
 from chipglow.camera.optics.image_formation import Gather
 from chipglow.camera.optics.sampling import integrate, largest
@@ -64,7 +64,7 @@ WITHOUT_FOOTPRINT: Final[Mapping[Moment, Gather]] = {
 
 
 def reference_temperature(
-    camera: Camera, exposure: Exposure, kind: ReferenceKind = "maximum"
+    camera: CameraDescription, exposure: Exposure, kind: ReferenceKind = "maximum"
 ) -> NDArray[np.float64]:
     """Return the temperature in K of a pixel without error; NaN where nothing radiates."""
     if kind not in get_args(ReferenceKind):
@@ -77,7 +77,7 @@ def reference_temperature(
     return np.asarray(camera.band.temperature(radiance), dtype=np.float64)
 
 
-def _true_temperature(camera: Camera, exposure: Exposure, moment: Moment) -> Array:
+def _true_temperature(camera: CameraDescription, exposure: Exposure, moment: Moment) -> Array:
     squares = exposure.raster, camera.pixels(exposure.raster), camera.fill_factor
     if moment == "maximum":
         return largest(exposure.peak_temperature, *squares)

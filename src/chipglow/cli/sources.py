@@ -126,8 +126,8 @@ def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:
     yield "times", f"{first} to {last}"
     if recording.integration_time is not None:
         yield "integration time", microseconds(recording.integration_time)
-    if recording.range_name is not None:
-        yield "range", recording.range_name
+    if recording.range is not None:
+        yield "range", recording.range
     if recording.saturation is not None:
         yield "saturated", f"over {recording.saturation:g}"
     if recording.least_signal is not None:

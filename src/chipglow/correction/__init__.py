@@ -17,7 +17,11 @@ from chipglow.correction.known_object import (
     correct_mapped as correct_mapped,
 )
 from chipglow.correction.places import place_frame as place_frame, places_of as places_of
-from chipglow.correction.scene_object import observed_scene as observed_scene
+from chipglow.correction.scene_object import (
+    observed_scene as observed_scene,
+    scene_truth as scene_truth,
+    surroundings_of as surroundings_of,
+)
 from chipglow.correction.zones import (
     Motion as Motion,
     ObservedObject as ObservedObject,

@@ -1,29 +1,33 @@
 """The unknowns: parts of square cells that the outlines of the zones cut."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.ndimage import distance_transform_edt, maximum_filter, minimum_filter
 
-from chipglow.correction.zones import NOTHING, ObservedObject
+from chipglow.correction.zones import NOTHING, Labels, ObservedObject
 from chipglow.quantities import Array
 from chipglow.scene import Raster
 
 CELLS_PER_PIXEL: Final = 2
 """Cells along the side of a pixel: the finest detail of which a pixel image contains data."""
 
-_POINTS: Final = 8
-"""Points along the side of a cell that an outline may cut: it is cut to 1/64."""
+_LINES: Final = 8
+"""Lines through a cell that an outline may cut, along which the outline is located."""
+
+_HALVINGS: Final = 8
+"""Halvings of the interval between two points with an outline between: to 1/4096 of a cell."""
 
 _FEW_POINTS: Final = 4
 """Points along the side of the cells at which outlines are searched."""
 
-_LEAST_AREA: Final = 1e-9
+_LEAST_AREA: Final = 2e-3
+"""Least fraction of a cell of a part: a smaller one sends less light than the model's error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +178,7 @@ def cut_cells(observed: ObservedObject, pixels: Raster) -> Parts:
 
 @dataclass(frozen=True, eq=False)
 class _Points:
-    """Labels and emissivities at points within cells, (cell, point), and the points' places.
+    """Labels and emissivities at points within cells, (cell, point), and the area of each.
 
     Places are to the right of and below a cell's centre, in widths of a cell.
     """
@@ -185,52 +189,111 @@ class _Points:
     emissivity: Array
     right: Array
     down: Array
-
-    @classmethod
-    def looked_up(
-        cls, observed: ObservedObject, cells: Raster, cell: NDArray[np.intp], count: int
-    ) -> "_Points":
-        """Look up `count` points along the side of each of the cells."""
-        offset = (np.arange(count) + 0.5) / count - 0.5
-        down, right = (grid.ravel() for grid in np.meshgrid(offset, offset, indexing="ij"))
-        row, column = np.divmod(cell[:, None], cells.columns)
-        x = cells.left + cells.spacing * (column + 0.5 + right)
-        y = cells.top - cells.spacing * (row + 0.5 + down)
-        labels, emissivity = observed.look_up(x, y)
-        return cls(cell, np.where(emissivity > 0, labels, NOTHING), emissivity, right, down)
+    """Centroid of the rectangle that each point stands for."""
+    width: Array
+    height: Array
+    """Sides of the rectangle in widths of a cell."""
 
     def chosen(self, mask: NDArray[np.bool_]) -> "_Points":
         """Return some of the cells."""
-        labels, emissivity = self.labels[mask], self.emissivity[mask]
-        return replace(self, cell=self.cell[mask], labels=labels, emissivity=emissivity)
+        return _Points(*(getattr(self, field.name)[mask] for field in fields(self)))
 
     def of_zone(self, number: int) -> dict[str, Array]:
         """Return area, emissivity, centroid and second moments of a zone's part of each cell."""
-        within = (self.labels == number).astype(np.float64)
-        area = within.mean(axis=1)
+        within = np.where(self.labels == number, self.width * self.height, 0.0)
+        area = within.sum(axis=1)
         lit = np.flatnonzero(area > _LEAST_AREA)
-        within = within[lit] / within[lit].sum(axis=1, keepdims=True)
-        right, down = within @ self.right, within @ self.down
-        own = 1 / (12 * self.right.size)
-        """Second moment of the square that each point stands for."""
+        within, (x, y) = within[lit] / area[lit, None], (self.right[lit], self.down[lit])
+        right, down = (within * x).sum(axis=1), (within * y).sum(axis=1)
+        own = self.width[lit] ** 2 / 12, self.height[lit] ** 2 / 12
         return {
             "cell": self.cell[lit].astype(np.float64),
             "area": area[lit],
             "emissivity": (within * self.emissivity[lit]).sum(axis=1),
             "right": right,
             "down": down,
-            "across": within @ self.right**2 + own - right**2,
-            "along": within @ self.down**2 + own - down**2,
-            "mixed": within @ (self.right * self.down) - right * down,
+            "across": (within * (x**2 + own[0])).sum(axis=1) - right**2,
+            "along": (within * (y**2 + own[1])).sum(axis=1) - down**2,
+            "mixed": (within * x * y).sum(axis=1) - right * down,
         }
 
 
-def _looked_up(observed: ObservedObject, cells: Raster) -> tuple[_Points, _Points]:
-    """Return points in the cells within a zone, and closer ones in those at outlines."""
-    few = _Points.looked_up(observed, cells, np.arange(cells.rows * cells.columns), _FEW_POINTS)
+def _looked_up(observed: ObservedObject, cells: Raster) -> tuple[_Points, ...]:
+    """Return points in the cells within a zone, and outlines in the others."""
+    few = _few_points(observed, cells)
     least, most = (end(few.labels, axis=1).reshape(cells.shape) for end in (np.min, np.max))
     whole = (minimum_filter(least, 3) == maximum_filter(most, 3)).ravel()
-    return few.chosen(whole), _Points.looked_up(observed, cells, few.cell[~whole], _POINTS)
+    cut = few.cell[~whole]
+    (by_rows, crossings), (by_columns, others) = (
+        _located(observed, cells, cut, along) for along in ("rows", "columns")
+    )
+    # Lines are best that the outline crosses: those along its normal.
+    rows_are_best = crossings >= others
+    return few.chosen(whole), by_rows.chosen(rows_are_best), by_columns.chosen(~rows_are_best)
+
+
+def _few_points(observed: ObservedObject, cells: Raster) -> _Points:
+    """Look up points on a square grid in every cell."""
+    cell, offset = np.arange(cells.rows * cells.columns), _middles(_FEW_POINTS)
+    down, right = (grid.ravel() for grid in np.meshgrid(offset, offset, indexing="ij"))
+    labels, emissivity = _at(observed, cells, cell[:, None], right, down)
+    sides = np.full(labels.shape, 1 / _FEW_POINTS)
+    right, down = (np.broadcast_to(one, labels.shape) for one in (right, down))
+    return _Points(cell, labels, emissivity, right, down, sides, sides)
+
+
+def _located(
+    observed: ObservedObject,
+    cells: Raster,
+    cell: NDArray[np.intp],
+    along: Literal["rows", "columns"],
+) -> tuple[_Points, NDArray[np.intp]]:
+    """Look up points on lines through cells; return them and the crossings of outlines per cell.
+
+    Between two points with different labels, the outline is located by halving.
+    """
+
+    def look_up(cell: NDArray[np.intp], line: Array, place: Array) -> tuple[Labels, Array]:
+        right, down = (place, line) if along == "rows" else (line, place)
+        return _at(observed, cells, cell, right, down)
+
+    lines, places = _middles(_LINES), np.arange(_LINES + 1) / _LINES - 0.5
+    labels, emissivity = look_up(cell[:, None, None], lines[:, None], places)
+    crossed = np.nonzero(labels[..., :-1] != labels[..., 1:])
+    low, high = places[crossed[2]], places[crossed[2] + 1]
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        found = look_up(cell[crossed[0]], lines[crossed[1]], middle)[0]
+        before = found == labels[crossed]
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    ends = np.empty((cell.size, _LINES, _LINES + 2))
+    ends[..., 0], ends[..., -1], ends[..., 1:-1] = -0.5, 0.5, (places[:-1] + places[1:]) / 2
+    ends[crossed[0], crossed[1], crossed[2] + 1] = (low + high) / 2
+    flat = cell.size, _LINES * (_LINES + 1)
+    middles = ((ends[..., :-1] + ends[..., 1:]) / 2).reshape(flat)
+    lengths = np.diff(ends, axis=-1).reshape(flat)
+    line = np.broadcast_to(lines[:, None], labels.shape).reshape(flat)
+    thickness = np.full(lengths.shape, 1 / _LINES)
+    centroids = (middles, line) if along == "rows" else (line, middles)
+    sides = (lengths, thickness) if along == "rows" else (thickness, lengths)
+    points = _Points(cell, labels.reshape(flat), emissivity.reshape(flat), *centroids, *sides)
+    return points, np.bincount(crossed[0], minlength=cell.size)
+
+
+def _middles(count: int) -> Array:
+    """Return the middles of equal parts of the side of a cell."""
+    return (np.arange(count) + 0.5) / count - 0.5
+
+
+def _at(
+    observed: ObservedObject, cells: Raster, cell: NDArray[np.intp], right: Array, down: Array
+) -> tuple[Labels, Array]:
+    """Return label and emissivity of points of cells."""
+    row, column = np.divmod(cell, cells.columns)
+    x = cells.left + cells.spacing * (column + 0.5 + right)
+    y = cells.top - cells.spacing * (row + 0.5 + down)
+    labels, emissivity = observed.look_up(x, y)
+    return np.where(emissivity > 0, labels, NOTHING), emissivity
 
 
 def _zone_parts(number: int, points: Sequence[_Points]) -> dict[str, Array]:

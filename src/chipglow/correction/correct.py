@@ -12,6 +12,7 @@ from scipy import sparse
 from scipy.special import stdtrit
 
 from chipglow.camera import Camera, Flag, Measurement, check_camera
+from chipglow.camera.image import image_formation
 from chipglow.correction.cells import Parts, cut_cells
 from chipglow.correction.correction import Correction, CorrectionFlag, joined
 from chipglow.correction.noise import noise_of
@@ -23,6 +24,7 @@ from chipglow.correction.sensitivity import (
     OutlineFit,
     fit_outline,
     noise_effect,
+    outline_effect,
     smoothing_effect,
     systematic_effects,
     texture_effect,
@@ -43,7 +45,7 @@ Images of analytic fields by cells of half a pixel differ by 0.02 K to 0.2 K fro
 of an eighth of a pixel: 1e-4 to 8e-4 of the radiance.
 """
 
-_OUTLINE_ROUNDS: Final = 3
+_OUTLINE_ROUNDS: Final = 8
 _OUTLINE_FOUND: Final = 0.02
 """Motion of the outlines in pixels below which they stay."""
 
@@ -201,17 +203,11 @@ def _corrected(
 ) -> _Frame:
     """Solve one frame, and propagate the uncertainties."""
     image, notes = _image(measurement, frame, camera, noise)
-    pixels, fit = measurement.raster, None
-    posterior = _solution(image, camera, known, pixels, generator, progress)
+    pixels, fit, former = measurement.raster, None, None
     if known.outline_uncertainty:
-        fit = fit_outline(posterior, known)
-    for _ in range(_OUTLINE_ROUNDS):
-        if fit is None or not fit.moves(_OUTLINE_FOUND * pixels.spacing):
-            break
-        observed = known.observed.moved(_added(known.observed.motion, fit.motion))
-        known = replace(known, observed=observed)
-        posterior = _solution(image, camera, known, pixels, generator, progress, posterior)
-        fit = fit_outline(posterior, known)
+        known, fit, former = _located(image, camera, known, pixels, lambda: progress(0.0))
+    problem = _problem(image, camera, known, pixels)
+    posterior = problem.solve(generator, lambda: progress(0.0), former)
     progress(0.5)
     bias = posterior.bias()
     noise_changes, data = noise_effect(posterior, generator)
@@ -223,7 +219,7 @@ def _corrected(
         *systematic_effects(posterior, known, measurement, frame),
     ]
     if fit is not None:
-        effects.append(Effect("outline", fit.effects))
+        effects.append(outline_effect(posterior, known, fit))
     progress(1.0)
     return _Frame(
         posterior.problem.parts,
@@ -276,23 +272,34 @@ def _received(displayed: Array, camera: Camera, pixels: Raster) -> tuple[Array, 
     return (displayed - dark) / gain, gain
 
 
-def _solution(
-    image: Image,
-    camera: Camera,
-    known: Knowledge,
-    pixels: Raster,
-    generator: np.random.Generator,
-    progress: Callable[[float], None],
-    former: Posterior | None = None,
-) -> Posterior:
+def _located(
+    image: Image, camera: Camera, known: Knowledge, pixels: Raster, check: Callable[[], None]
+) -> tuple[Knowledge, OutlineFit, Posterior]:
+    """Move the outlines to where the image shows them.
+
+    The prior has the same weights everywhere: weights that follow from the data would admit, where
+    an outline is wrong, the bends of the radiance that this error causes.
+    """
+    posterior = _problem(image, camera, known, pixels).smooth(check)
+    fit = fit_outline(posterior, known)
+    for _ in range(_OUTLINE_ROUNDS):
+        if not fit.moves(_OUTLINE_FOUND * pixels.spacing):
+            break
+        observed = known.observed.moved(_added(known.observed.motion, fit.motion))
+        known = replace(known, observed=observed)
+        posterior = _problem(image, camera, known, pixels).smooth(check, posterior)
+        fit = fit_outline(posterior, known)
+    return known, fit, posterior
+
+
+def _problem(image: Image, camera: Camera, known: Knowledge, pixels: Raster) -> Problem:
     parts = cut_cells(known.observed, pixels)
-    formation = camera.image_formation(parts.cells, pixels=pixels)
+    formation = image_formation(camera, parts.cells, pixels=pixels)
     room = float(known.band.radiance(known.surroundings.values))
     cells = parts.cells.rows * parts.cells.columns
     mirrored = np.bincount(parts.cell, parts.area * (1 - parts.emissivity), cells)
     reflected = room * formation.forward(mirrored.reshape(parts.cells.shape))
-    problem = Problem(image, parts, formation, reflected)
-    return problem.solve(generator, lambda: progress(0.0), former)
+    return Problem(image, parts, formation, reflected)
 
 
 def _correction_of(

@@ -106,6 +106,15 @@ class Problem:
         """Return the mean blackbody radiance of the parts in W/(m² sr)."""
         return np.asarray(np.exp(self.parts.at_centroids @ x))
 
+    def smooth(self, check: Callable[[], None], former: "Posterior | None" = None) -> "Posterior":
+        """Return the solution with the same weights of the prior everywhere.
+
+        A `former` solution, which may be one with other outlines, is the start.
+        """
+        if former is None:
+            return self._maximum(self._start(), check)
+        return self._maximum(former.problem.parts.continued(former.x, self.parts), check)
+
     def solve(
         self,
         generator: np.random.Generator,
@@ -115,17 +124,10 @@ class Problem:
         """Return the solution, with weights of the prior that follow from the data.
 
         The variance of the curvatures is their mean square around each place, which includes their
-        uncertainty (expectation maximisation of the evidence, with a few draws for it). The
-        solution of a `former` problem with other outlines is a start that needs fewer rounds.
+        uncertainty (expectation maximisation of the evidence, with a few draws for it).
         """
-        if former is None:
-            x, rounds = self._start(), _ROUNDS
-        else:
-            x, rounds = former.problem.parts.continued(former.x, self.parts), 1
-            variances = former.problem.parts.continued(former.variances, self.parts)
-            self._weigh(variances[self.curvature.part])
-        posterior = self._maximum(x, check)
-        for _ in range(rounds):
+        posterior = self.smooth(check, former)
+        for _ in range(_ROUNDS):
             draws = posterior.draws(generator, _DRAWS_PER_ROUND)
             check()
             uncertain = ((self.curvature.matrix @ draws.T) ** 2).mean(axis=1)
@@ -181,14 +183,6 @@ class Posterior:
     def residual(self) -> Array:
         """Measured minus predicted radiance, (y, x)."""
         return np.asarray(self.problem.image.radiance - self.predicted)
-
-    @property
-    def variances(self) -> Array:
-        """Mean variance of the curvatures around each part, (part,)."""
-        part, size = self.problem.curvature.part, self.x.size
-        count = np.bincount(part, minlength=size)
-        sums = np.bincount(part, 1 / self.prior_weights, size)
-        return np.where(count > 0, sums / np.maximum(count, 1), sums.sum() / part.size)
 
     @property
     def misfit(self) -> float:

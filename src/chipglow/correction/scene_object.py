@@ -5,11 +5,14 @@ from typing import Final
 
 import numpy as np
 
-from chipglow.camera import Camera
+from chipglow.camera import Camera, ImageFormation
+from chipglow.correction.correction import Correction
 from chipglow.correction.zones import NOTHING, SampledObject, Zone
 from chipglow.quantities import Array
+from chipglow.quantities.units import COLDEST
 from chipglow.scene import Material, Scene
 from chipglow.surface import FeatureSurface, Surface, UniformSurface, bare_surface
+from chipglow.uncertainty import Estimate
 
 METAL, TOOL = "chip and workpiece", "tool"
 """Zones of a scene."""
@@ -44,6 +47,47 @@ def observed_scene(
         for number, (name, deviation) in enumerate(zip((METAL, TOOL), deviations, strict=True))
     )
     return SampledObject(zones, scene.raster, labels, emissivity)
+
+
+def scene_truth(
+    result: Correction, scene: Scene, camera: Camera, known: SampledObject, start: float
+) -> Array:
+    """Return the temperatures that a correction of one frame is to determine, from the scene.
+
+    Parameters
+    ----------
+    result : Correction
+        Correction of an exposure of the scene.
+    scene : Scene
+        The observed scene.
+    camera : Camera
+        Camera of the exposure.
+    known : SampledObject
+        Zones of the scene, of `observed_scene`.
+    start : float
+        Start of the exposure in s.
+
+    Returns
+    -------
+    numpy.ndarray
+        Temperature in K of the mean radiance over the exposure and over the part of each pixel in
+        its zone, shape (y, x); NaN without a zone.
+    """
+    zone = result.data["zone"][0].values
+    black = camera.expose(scene, UniformSurface(1.0), start).mean_radiance
+    footprint = ImageFormation(scene.raster, result.raster, None, False, 1.0)
+    radiance = np.full(zone.shape, np.nan)
+    for number in range(len(known.zones)):
+        own = known.labels == number
+        light, area = (footprint.forward(np.where(own, one, 0.0)) for one in (black, 1.0))
+        chosen = (zone == number) & (area > 0)
+        radiance[chosen] = light[chosen] / area[chosen]
+    return np.asarray(camera.band.temperature(radiance))
+
+
+def surroundings_of(camera: Camera) -> Estimate:
+    """Return the reflected temperature in K; dark surroundings hardly radiate at the lowest one."""
+    return Estimate(np.array(COLDEST if camera.reflected is None else camera.reflected))
 
 
 def _mean_of(values: Array) -> float | None:

@@ -32,8 +32,8 @@ the intervals at outlines held 95 % on the scenes of ``benchmarks/correction.py`
 _WIDTH_STEP: Final = 0.01
 """Relative change of the width of the point spread function for derivatives."""
 
-_OUTLINE_STEP: Final = 0.25
-"""Displacement of the outlines in pixels for derivatives: wider than the 1/16 of a look-up."""
+_OUTLINE_STEP: Final = 0.03
+"""Displacement of the outlines in pixels for derivatives; cells are cut to 1/8192 of a pixel."""
 
 _PSF_DRAWS: Final = 6
 
@@ -222,8 +222,8 @@ class OutlineFit:
     """The motion of the outlines, from their present position, that the image shows."""
 
     motion: Motion
-    effects: Array
-    """Changes of the parts' values by the remaining uncertainty of the motion, (3, part)."""
+    root: Array
+    """Motions in m (turns at `_turn_radius`) of one standard uncertainty each, (3, direction)."""
     standard_uncertainty: Motion
 
     def moves(self, least: float) -> bool:
@@ -235,35 +235,50 @@ def fit_outline(posterior: Posterior, known: Knowledge) -> OutlineFit:
     """Estimate the motion of the outlines together with the radiance, linearised.
 
     The image shows the position where the radiance changes across an outline. Where it does not,
-    the stated uncertainty remains.
+    the stated uncertainty remains. A motion is not larger than that uncertainty.
     """
     turn_radius = _turn_radius(posterior.problem.parts)
-    images = [
-        _motion_image(posterior, known.observed, direction, turn_radius) for direction in np.eye(3)
-    ]
+    images = _motion_images(posterior, known)
     responses = posterior.changed_all(images)
-    weights = posterior.pixel_weights
-    information = np.eye(3) / known.outline_uncertainty**2
+    weights, gradient = posterior.pixel_weights, posterior.gradient
     unexplained = [
         image - posterior.seen_change(response)
         for image, response in zip(images, responses, strict=True)
     ]
-    information += [[(weights * one * other).sum() for other in unexplained] for one in images]
-    information = (information + information.T) / 2
+    # These sums over data and prior depend on errors of the responses in the second order only.
+    information = np.array(
+        [[(weights * one * other).sum() for other in unexplained] for one in unexplained]
+    )
+    information += responses @ (posterior.bending @ responses.T)
+    information += np.eye(3) / known.outline_uncertainty**2
     scale = np.array([1.0, 1.0, 1 / turn_radius])
     stated = np.array(astuple(known.observed.motion)) / scale
     slope = np.array([(weights * image * posterior.residual).sum() for image in images])
-    slope -= stated / known.outline_uncertainty**2
-    motion = np.linalg.solve(information, slope)
-    root = np.linalg.cholesky(np.linalg.inv(information))
-    spread = np.sqrt(np.diag(np.linalg.inv(information))) * scale
-    changes = -root.T @ responses
-    return OutlineFit(Motion(*(motion * scale)), changes, Motion(*spread))
+    slope -= responses @ gradient + stated / known.outline_uncertainty**2
+    covariance = np.linalg.inv(information)
+    motion = covariance @ slope
+    motion *= min(1.0, known.outline_uncertainty / float(np.abs(motion).max()))
+    spread = np.sqrt(np.diag(covariance)) * scale
+    root = np.asarray(np.linalg.cholesky((covariance + covariance.T) / 2), np.float64)
+    return OutlineFit(Motion(*(motion * scale)), root, Motion(*spread))
+
+
+def outline_effect(posterior: Posterior, known: Knowledge, fit: OutlineFit) -> Effect:
+    """Return the effect of the remaining uncertainty of the outlines' position."""
+    images = np.stack(_motion_images(posterior, known))
+    errors = np.tensordot(fit.root.T, images, axes=1)
+    return Effect("outline", -posterior.changed_all(list(errors)))
 
 
 def _turn_radius(parts: Parts) -> float:
     """Return the distance in m at which a turn is as large as a shift: a quarter of the image."""
     return max(parts.pixels.shape) * parts.pixels.spacing / 4
+
+
+def _motion_images(posterior: Posterior, known: Knowledge) -> list[Array]:
+    """Return the changes of the image with a motion to the right, up and with a turn, per m."""
+    radius = _turn_radius(posterior.problem.parts)
+    return [_motion_image(posterior, known.observed, direction, radius) for direction in np.eye(3)]
 
 
 def _motion_image(

@@ -1,6 +1,7 @@
 """The embedded cutting simulation."""
 
 from chipglow.cutting.conditions import (
+    CutSettings as CutSettings,
     CuttingConditions as CuttingConditions,
     Friction as Friction,
     Numerics as Numerics,

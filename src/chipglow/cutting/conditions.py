@@ -1,7 +1,7 @@
 """Conditions of a cut: speed, feed, friction, output window, numerics."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Final, Self
 
 from chipglow.quantities import Parameter, Part, zero_to_one
@@ -209,6 +209,22 @@ class Numerics(Part):
         return replace(
             self, **{name: max(getattr(self, name), at + rim) for name, at in reach.items()}
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class CutSettings(Part):
+    """Settings of a `CuttingSimulation` that a study states as it takes them."""
+
+    friction: Annotated[Friction, Parameter("Friction between chip and tool.")] = field(
+        default_factory=Friction
+    )
+    surroundings: Annotated[
+        Surroundings,
+        Parameter("Surroundings to which chip, workpiece and tool lose heat; none by default."),
+    ] = field(default_factory=Surroundings)
+    numerics: Annotated[Numerics, Parameter("Cells and time steps of the computation.")] = field(
+        default_factory=Numerics
+    )
 
 
 def unresolved(lengths: Mapping[str, float], cell: float) -> tuple[str, ...]:

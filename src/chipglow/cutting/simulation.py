@@ -11,11 +11,10 @@ from numba import get_num_threads
 from numpy.typing import NDArray
 
 from chipglow.cutting.conditions import (
+    CutSettings,
     CuttingConditions,
-    Friction,
     Numerics,
     OutputWindow,
-    Surroundings,
     unresolved,
 )
 from chipglow.cutting.damage import Damage
@@ -85,31 +84,65 @@ SCAN_FEEDS: Final = 1.5
 The line is at right angles to the rake face, over the uncut surface and most often in contact.
 """
 
-_MARGIN: Final = 4
+_MARGIN_CELLS: Final = 4
+"""Cells of the grid on each side of the region: points start two cells before it, and their splines
+reach two more."""
+
 _GAP: Final = 5.0
 """Spacings of points without a point that part the chip from other material."""
+
 _CONTACT_STIFFNESS: Final = 50e9
+"""Force on a point per width and depth of its contact in Pa: a pressure of 1 GPa pushes points that
+are 5 µm apart 0.1 µm into the tool."""
+
 _CONTACT_DAMPING: Final = 0.2
-_LARGEST_DRIFT: Final = 0.1
-_FASTEST_DRIFT: Final = 0.4
+"""Damping of the contact as a fraction of the critical one, so that points do not bounce off the
+tool."""
+
+_MAX_DRIFT: Final = 0.1
+"""Cells by which the workpiece may move between two sortings of the points into cells."""
+
+_MAX_FASTEST_DRIFT: Final = 0.4
+"""Cells by which the fastest point may move between two sortings."""
+
 _HEAT_STABILITY: Final = 0.15
+"""Time step of conduction in cell² over diffusivity; explicit conduction in two dimensions is
+stable below 0.25."""
+
+_USUAL_FLOW: Final = (1.0, 1e4)
+"""Plastic strain, and its rate in 1/s, at which the flow stress gives the usual cutting force."""
+
+_INERTIA_SHARE: Final = 0.0045
+"""Momentum flow of the scaled mass as a fraction of the usual cutting force; see `mass_scaling`."""
+
+_MAX_MASS_SCALING: Final = 1000.0
+"""Largest factor on the density that is chosen, for slow cuts."""
+
 _NO_BAND_WIDTH: Final = (
     "The workpiece has no nonlocal viscosity: a shear band is about two cells wide, of any cell."
 )
-
-_INERTIA_FRACTION: Final = 0.0045
-_LARGEST_SCALING: Final = 1000.0
 
 STEADY_TOLERANCE: Final = 1.0
 """Change in K of the contact's mean temperature, over the last rounds, under which a tool counts as
 steady."""
 
-_ROUND: Final = 2.0
-_COARSE: Final = 12.0
-_FULL_STEPS: Final = 3
-_SETTLED: Final = 3
-_MOST_ROUNDS: Final = 48
+_ROUND_LENGTH: Final = 2.0
+"""Length of cut of a round of the steady tool in feeds: about two segments."""
+
+_COARSE_CELLS: Final = 12.0
+"""Cells in a feed of the cut that warms the tool."""
+
+_FULL_ROUNDS: Final = 3
+"""Rounds after which the temperature becomes the mean of the rounds, since segments differ."""
+
+_SETTLED_ROUNDS: Final = 3
+"""Last rounds over which the contact's temperature is compared with `STEADY_TOLERANCE`."""
+
+_MAX_ROUNDS: Final = 48
+"""Rounds after which a tool that is not steady is an error."""
+
 _USUAL_ROUNDS: Final = 18
+"""Rounds from which the expected time of a cut is computed."""
 
 
 class SolverError(RuntimeError):
@@ -133,7 +166,7 @@ class ForceHistory(Brief):
 
 
 @dataclass(frozen=True)
-class CuttingSimulation:
+class CuttingSimulation(CutSettings):
     """Thermo-mechanical simulation of an orthogonal cut in plane strain.
 
     Material points (MLS-MPM with affine velocities) carry stress, strain, temperature and their
@@ -150,12 +183,6 @@ class CuttingSimulation:
         The workpiece's material.
     tool_material : ToolMaterial
         The tool's material.
-    friction : Friction
-        Friction and heat in the contact.
-    numerics : Numerics
-        Cells, time steps and region.
-    surroundings : Surroundings
-        Surroundings to which free surfaces lose heat.
     tool_temperature : float or ToolBody, optional
         Initial temperature of the tool in K. A body: the steady-state temperature of a long cut,
         by conduction through this body. None: the temperature of the workpiece, as in the paper.
@@ -165,9 +192,6 @@ class CuttingSimulation:
     tool: Tool = field(default_factory=ToolGeometry)
     workpiece: WorkpieceMaterial = field(default_factory=partial(workpiece, "aisi-1045"))
     tool_material: ToolMaterial = field(default_factory=partial(tool_material, "carbide"))
-    friction: Friction = field(default_factory=Friction)
-    numerics: Numerics = field(default_factory=Numerics)
-    surroundings: Surroundings = field(default_factory=Surroundings)
     tool_temperature: float | ToolBody | None = None
 
     def run(
@@ -236,10 +260,10 @@ class CuttingSimulation:
         if self.numerics.mass_scaling is not None:
             return self.numerics.mass_scaling
         start = self.conditions.initial_temperature
-        strength = float(self.workpiece.flow_stress.at(1.0, 1e4, start))
+        strength = float(self.workpiece.flow_stress.at(*_USUAL_FLOW, start))
         dynamic = float(self.workpiece.density_at(start)) * self.conditions.speed**2
-        scaling = _INERTIA_FRACTION * sqrt(3.0) * strength / dynamic
-        return min(max(scaling, 1.0), _LARGEST_SCALING)
+        scaling = _INERTIA_SHARE * sqrt(3.0) * strength / dynamic
+        return min(max(scaling, 1.0), _MAX_MASS_SCALING)
 
     @property
     def resolution_warnings(self) -> tuple[str, ...]:
@@ -264,7 +288,7 @@ class CuttingSimulation:
         own = points / side**2 * conditions.cutting_length / conditions.speed / step
         if not isinstance(self.tool_temperature, ToolBody):
             return own
-        return own + self._long_cut().point_steps * _USUAL_ROUNDS / _MOST_ROUNDS
+        return own + self._long_cut().point_steps * _USUAL_ROUNDS / _MAX_ROUNDS
 
     def steady_tool(self) -> SteadyTool:
         """Return the tool after a long cut: cut and conduct in turn until it is steady.
@@ -279,18 +303,21 @@ class CuttingSimulation:
         if not isinstance(body, ToolBody):
             raise ValueError(f"tool_temperature: {body!r}, expected the body of a tool")
         coarse = self._long_cut()
-        distance = coarse.conditions.cutting_length / _MOST_ROUNDS
+        distance = coarse.conditions.cutting_length / _MAX_ROUNDS
         state = _State(coarse, distance / self.conditions.speed)
         rounds: list[float] = []
-        for number in range(1, _MOST_ROUNDS + 1):
+        for number in range(1, _MAX_ROUNDS + 1):
             rounds.append(state.heat_through(body, number))
-            recent = rounds[-_SETTLED:]
-            if number > _FULL_STEPS + _SETTLED and max(recent) - min(recent) < STEADY_TOLERANCE:
+            recent = rounds[-_SETTLED_ROUNDS:]
+            if (
+                number > _FULL_ROUNDS + _SETTLED_ROUNDS
+                and max(recent) - min(recent) < STEADY_TOLERANCE
+            ):
                 break
         else:
             raise SolverError(
                 f"warm tool: the contact's temperature still changes by "
-                f"{max(recent) - min(recent):.1f} K in {_SETTLED} rounds, "
+                f"{max(recent) - min(recent):.1f} K in {_SETTLED_ROUNDS} rounds, "
                 f"expected less than {STEADY_TOLERANCE:g}"
             )
         return SteadyTool(state.grid, state.tool_fraction, state.tool_temperature, tuple(rounds))
@@ -300,8 +327,8 @@ class CuttingSimulation:
         feed = self.conditions.feed
         return replace(
             self,
-            conditions=replace(self.conditions, cutting_length=_MOST_ROUNDS * _ROUND * feed),
-            numerics=replace(self.numerics, cell=max(self.numerics.cell, feed / _COARSE)),
+            conditions=replace(self.conditions, cutting_length=_MAX_ROUNDS * _ROUND_LENGTH * feed),
+            numerics=replace(self.numerics, cell=max(self.numerics.cell, feed / _COARSE_CELLS)),
             tool_temperature=None,
         )
 
@@ -323,10 +350,15 @@ class CuttingSimulation:
     @property
     def overview_raster(self) -> Raster:
         """Samples of a quarter of a cell over the computed region."""
-        grid = _grid(self.numerics)
-        left, top = grid.left + 4 * grid.cell, grid.bottom + (grid.rows - 7) * grid.cell
-        rows, columns = (4 * (count - 11) for count in (grid.rows, grid.columns))
-        return Raster(left, top, grid.cell / 4, rows, columns)
+        grid, samples = _grid(self.numerics), 4
+        leaving = 2  # cells at the right and at the top, through which the material leaves
+        left = grid.left + _MARGIN_CELLS * grid.cell
+        top = grid.bottom + (grid.rows - 1 - _MARGIN_CELLS - leaving) * grid.cell
+        rows, columns = (
+            samples * (count - 1 - 2 * _MARGIN_CELLS - leaving)
+            for count in (grid.rows, grid.columns)
+        )
+        return Raster(left, top, grid.cell / samples, rows, columns)
 
     def lattice(self, raster: Raster) -> Lattice:
         """Return the nodes whose splines the frames are; the raster must be simulated."""
@@ -455,7 +487,7 @@ class _State:
             self.grid, self.tool_fraction, self.tool_heat, body,
             np.maximum(heat + draining * met, 0.0), draining,
         )  # fmt: skip
-        part = 1.0 / max(number - _FULL_STEPS, 1)
+        part = 1.0 / max(number - _FULL_ROUNDS, 1)
         self.tool_temperature = begin + part * (found - begin)
         self.tool_beyond = beyond(self.grid, self.tool_border, self.tool_temperature, body)
         return float((self.contact_area * self.tool_temperature).sum() / self.contact_area.sum())
@@ -468,7 +500,7 @@ class _State:
         above = max(round(conditions.feed / self.spacing), 1)
         self.rows = self.spacing * (np.arange(-layers, above, dtype=np.float64) + 0.5)
         self.entry = -numerics.upstream - pad
-        heights = np.linspace(0.0, conditions.feed, 64)
+        heights = np.linspace(0.0, conditions.feed, 64)  # of the face, finer than the cells
         self.face = _touching(self.tool, heights)
         self.columns = 0
         travel = conditions.cutting_length + 4 * numerics.cell
@@ -627,7 +659,7 @@ class _State:
 
 
 def _grid(numerics: Numerics) -> Grid:
-    margin = _MARGIN * numerics.cell
+    margin = _MARGIN_CELLS * numerics.cell
     width = numerics.upstream + numerics.downstream + 2 * margin
     height = numerics.depth + numerics.height + 2 * margin
     columns, rows = (round(length / numerics.cell) + 1 for length in (width, height))
@@ -651,8 +683,8 @@ def _time_steps(
     """
     material, numerics = simulation.workpiece, simulation.numerics
     drift = min(
-        _LARGEST_DRIFT * numerics.cell / simulation.conditions.speed,
-        _FASTEST_DRIFT * numerics.cell / max(fastest, 1e-9),
+        _MAX_DRIFT * numerics.cell / simulation.conditions.speed,
+        _MAX_FASTEST_DRIFT * numerics.cell / max(fastest, 1e-9),
     )
     tool, temperature = simulation.tool_material, simulation.conditions.initial_temperature
     diffusivity = max(
@@ -669,8 +701,8 @@ def _time_steps(
 
 def _touching(tool: ToolSurface, heights: NDArray[np.float64]) -> float:
     """Return the place of a vertical face that touches the tool from the left."""
-    low, high = -1e-2, 0.0
-    for _ in range(60):
+    low, high = -1e-2, 0.0  # 10 mm before the edge, beyond any tool
+    for _ in range(60):  # halvings, to the last bit
         middle = (low + high) / 2
         clear = (surface_distances(np.full_like(heights, middle), heights, tool) > 0.0).all()
         low, high = (middle, high) if clear else (low, middle)

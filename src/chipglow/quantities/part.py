@@ -55,7 +55,8 @@ class Part:
     comments, errors and JSON schema, and the parameters in the documentation. Fields without a
     `Parameter` are not for descriptions; one that a base class declares can have another default,
     as ``pitch: float = 5e-6``. The constructor takes SI numbers, and what a description
-    would give: text with units, and mappings for parts.
+    would give: text with units, and mappings for parts. ``class Other(Part, overrides=One)`` has
+    the fields of `One`; each is None by default, for what another source states.
 
     Attributes
     ----------
@@ -80,9 +81,12 @@ class Part:
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
-    def __init_subclass__(cls, **arguments: Any) -> None:
+    def __init_subclass__(cls, overrides: "type[Part] | None" = None, **arguments: Any) -> None:
         super().__init_subclass__(**arguments)
         own = inspect.get_annotations(cls)
+        for name, annotation in ({} if overrides is None else overrides._annotations).items():
+            own[name] = Annotated[annotation.__origin__ | None, *annotation.__metadata__]
+            setattr(cls, name, None)
         if any(isinstance(annotation, str) for annotation in own.values()):
             own = inspect.get_annotations(cls, eval_str=True)
         annotations: dict[str, Any] = {}

@@ -1,8 +1,8 @@
 """Numbers that describe the cut, the chip and the camera in a report.
 
 Each is one function, which returns its value in SI, and one entry of a table, which states its key
-in summary.json and the unit and decimals in which it is shown. Their titles and explanations stand
-in ``texts.yaml`` under the same keys.
+in summary.json (of a corrected place the end of it) and the unit and decimals in which it is shown.
+Their titles and explanations stand in ``texts.yaml`` under the same keys.
 """
 
 from collections.abc import Callable
@@ -10,9 +10,12 @@ from dataclasses import dataclass
 from math import nan
 from typing import Final, Generic, NamedTuple, TypeVar
 
-from chipglow.analysis import CuttingForces
+import numpy as np
+
+from chipglow.analysis import CorrectedPlace, CorrectedWindow, CuttingForces
 from chipglow.camera import Camera, FlatFieldCalibration
 from chipglow.chip import ChipMetrics, Segment, Segmentation
+from chipglow.quantities import Array
 from chipglow.report.shown_units import SHOWN_UNITS
 from chipglow.scene import Raster
 
@@ -304,6 +307,80 @@ CAMERA: Final[tuple[Entry[CalibratedCamera], ...]] = (
     Entry("lower_limit_degC", "°C", lower_limit),
     Entry("saturated_degC", "°C", saturation_temperature),
 )
+
+
+# A corrected place, and the part of the image around it.
+
+
+def measured_temperature(place: CorrectedPlace) -> Value:
+    """Return the mean radiance temperature of the pixels in K."""
+    return Value(place.measured)
+
+
+def corrected_temperature(place: CorrectedPlace) -> Value:
+    """Return the mean corrected temperature in K, with its standard uncertainty."""
+    one = place.estimate
+    freedom = float(one.degrees_of_freedom)
+    return Value(float(one.values), float(one.standard_uncertainty), freedom)
+
+
+def interval_low(place: CorrectedPlace) -> Value:
+    """Return the lower end of the 95 % interval of the corrected temperature in K."""
+    return Value(float(place.estimate.values - place.estimate.expanded_uncertainty()))
+
+
+def interval_high(place: CorrectedPlace) -> Value:
+    """Return the upper end of the 95 % interval of the corrected temperature in K."""
+    return Value(float(place.estimate.values + place.estimate.expanded_uncertainty()))
+
+
+def true_temperature(place: CorrectedPlace) -> Value:
+    """Return the mean true temperature in K, each pixel's of the mean radiance."""
+    return Value(place.true)
+
+
+PLACE: Final[tuple[Entry[CorrectedPlace], ...]] = (
+    Entry("measured_degC", "°C", measured_temperature),
+    Entry("corrected_degC", "°C", corrected_temperature),
+    Entry("corrected_low_degC", "°C", interval_low),
+    Entry("corrected_high_degC", "°C", interval_high),
+    Entry("true_degC", "°C", true_temperature),
+)
+
+
+def held_fraction(window: CorrectedWindow) -> Value:
+    """Return the fraction of the pixels whose 95 % interval contains the true temperature."""
+    pixels = np.count_nonzero(window.judged)
+    return Value(np.count_nonzero(window.held) / pixels if pixels else nan)
+
+
+def measured_deviation(window: CorrectedWindow) -> Value:
+    """Return the root mean square of measured minus true temperature over the pixels in K."""
+    return Value(_deviation(window, window.measurement.radiance_temperature()[0]))
+
+
+def corrected_deviation(window: CorrectedWindow) -> Value:
+    """Return the root mean square of corrected minus true temperature over the pixels in K."""
+    return Value(_deviation(window, window.correction.data["temperature"][0].values))
+
+
+def emissivity_uncertainty(window: CorrectedWindow) -> Value:
+    """Return the standard uncertainty of the mean emissivity in the correction."""
+    return Value(window.emissivity_uncertainty)
+
+
+WINDOW: Final[tuple[Entry[CorrectedWindow], ...]] = (
+    Entry("measured_rms_K", "K", measured_deviation),
+    Entry("corrected_rms_K", "K", corrected_deviation),
+    Entry("held_percent", "%", held_fraction),
+    Entry("emissivity_uncertainty", "", emissivity_uncertainty, decimals=3),
+)
+
+
+def _deviation(window: CorrectedWindow, temperature: Array) -> float:
+    if not window.judged.any():
+        return nan
+    return float(np.sqrt(np.mean((temperature - window.true)[window.judged] ** 2)))
 
 
 def _freedom_of_period(found: Segmentation) -> int:

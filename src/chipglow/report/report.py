@@ -13,7 +13,7 @@ from chipglow import __version__
 from chipglow.analysis import Analysis, with_errors
 from chipglow.drawing import drawing
 from chipglow.io import write_dataset
-from chipglow.report import attribution, cut_figures, figures, paper
+from chipglow.report import attribution, corrected, cut_figures, figures, paper
 from chipglow.report.answer import answer, changes
 from chipglow.report.facts import Facts
 from chipglow.report.page import environment, texts
@@ -57,12 +57,17 @@ _FIGURES: Final[Mapping[str, Callable[[Facts], Figure | None]]] = {
     "error-lines": figures.error_lines,
     "attribution": attribution.maps,
     "attribution-lines": attribution.profiles,
+    "corrected": corrected.images,
+    "corrected-lines": corrected.curves,
     "over-time": figures.over_time,
     "psf-sensitivity": figures.psf_sensitivity,
     "forces": cut_figures.forces,
     "chip-thickness": cut_figures.chip_thickness,
 }
 """The figure of the answer, all figures in the order of the paper, then further ones."""
+
+
+_OF_A_CUT: Final = cut_figures.__name__, corrected.__name__
 
 
 def write_report(
@@ -121,6 +126,9 @@ def write_report(
         "answer": answer(facts, rows["errors"]),
         "changes": changes(facts, rows["errors"]),
         "attribution": list(attribution.sentences(facts)),
+        "corrections": list(
+            corrected.sentences(facts, {row.key: row for row in rows["corrected"]})
+        ),
         "note": facts.text(texts()["note"]),
         "camera_settings": facts.settings,
         "figures": dict(_figures(facts, folder / "figures")),
@@ -159,7 +167,7 @@ def _attempt(title: str, make: Callable[[], Any]) -> Any:
 
 def _figures(facts: Facts, folder: Path) -> Iterator[tuple[str, FigureFile | Failure]]:
     for name, draw in _FIGURES.items():
-        if facts.analysis.cut is None and draw.__module__ == cut_figures.__name__:
+        if facts.analysis.cut is None and draw.__module__ in _OF_A_CUT:
             continue
         title = facts.text(texts()["figures"][name]["title"])
         figure = _attempt(title, partial(_figure, facts, name, title, draw, folder))

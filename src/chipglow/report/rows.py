@@ -147,13 +147,14 @@ def results_frame(analysis: Analysis, study: Any = None) -> pd.DataFrame:
 
 
 def all_rows(facts: Facts) -> dict[str, list[Row]]:
-    """Return the rows of the report: errors, cut, chip and camera."""
+    """Return the rows of the report: errors, cut, corrected temperatures, chip and camera."""
     cut = facts.analysis.cut
     names = map(str, facts.data.reading.values)
     errors = [_reading(facts, name) for name in names if cut or name in facts.headlines]
     return {
         "errors": [row for pair in errors for row in pair],
         "cut": [*_forces(facts, cut), *_segments(facts, cut)] if cut else [],
+        "corrected": list(_corrected(facts, cut)) if cut else [],
         "chip": _chip(facts, cut) if cut else [],
         "camera": _camera(facts),
     }
@@ -169,6 +170,21 @@ def _segments(facts: Facts, cut: Cut) -> list[Row]:
     return [_segment_row(facts, entry, cut) for entry in numbers.SEGMENT]
 
 
+def _corrected(facts: Facts, cut: Cut) -> Iterator[Row]:
+    """Yield the rows of the corrected places, and of the image around them."""
+    words = texts()["corrected"]
+    for window in cut.corrected:
+        for place in window.places:
+            names = {"place": place.name, "window": window}
+            for entry in numbers.PLACE:
+                key = f"{slug(place.name)}_{entry.key}"
+                yield _number_row(facts, replace(entry, key=key), place, words[entry.key], names)
+    for window in cut.corrected:
+        for whole in numbers.WINDOW:
+            key, names = f"{slug(window.surface)}_{whole.key}", {"window": window}
+            yield _number_row(facts, replace(whole, key=key), window, words[whole.key], names)
+
+
 def _chip(facts: Facts, cut: Cut) -> list[Row]:
     if cut.chip is None:
         return []
@@ -182,14 +198,20 @@ def _camera(facts: Facts) -> list[Row]:
     return [_number_row(facts, entry, camera) for entry in numbers.CAMERA]
 
 
-def _number_row(facts: Facts, entry: Entry[Source], source: Source) -> Row:
-    """Return the row of a number that was not drawn."""
+def _number_row(
+    facts: Facts,
+    entry: Entry[Source],
+    source: Source,
+    words: Mapping[str, str] | None = None,
+    names: Mapping[str, Any] | None = None,
+) -> Row:
+    """Return the row of a number that was not drawn, by default with the texts of its key."""
     value = entry.shown(source)
     return _row(
         facts,
-        _Heading(entry.key, entry.unit, texts()["rows"][entry.key]),
+        _Heading(entry.key, entry.unit, words or texts()["rows"][entry.key]),
         value.number,
-        names={"value": value.number, "uncertainty": value.uncertainty},
+        names={"value": value.number, "uncertainty": value.uncertainty, **(names or {})},
         decimals=entry.decimals,
         uncertainty=known(value.uncertainty),
         freedom=known(value.freedom),

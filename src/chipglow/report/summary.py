@@ -96,6 +96,10 @@ class Summary(_Numbered):
     """Metrics of the chip."""
     chip_uncertainty: dict[str, FiniteFloat] = {}
     """Standard uncertainty or standard deviation, see the explanation."""
+    corrected: _Numbers = {}
+    """Rake face and shear band of the shown exposure: measured, corrected and true."""
+    corrected_uncertainty: dict[str, FiniteFloat] = {}
+    """Standard uncertainty of corrected temperatures."""
     paper: dict[str, FiniteFloat] = {}
     """Published values."""
     paper_rounding: dict[str, FiniteFloat] = {}
@@ -118,6 +122,7 @@ def summary(
 ) -> Summary:
     """Return the numbers of a report."""
     results, chip = [*rows["errors"], *rows["cut"]], rows["chip"]
+    corrected = rows["corrected"]
     drawn = {row.key: row.draws for row in results if row.draws is not None}
     published = {row.key: row.published for row in results if row.published is not None}
     return Summary(
@@ -135,15 +140,23 @@ def summary(
         attribution={slug(name): dict(one) for name, one in attributed.items()},
         one_draw={row.key: row.one_draw for row in results if row.one_draw is not None},
         chip={row.key: row.here for row in chip},
-        chip_uncertainty={row.key: row.uncertainty for row in chip if row.uncertainty is not None},
+        chip_uncertainty=_uncertainties(chip),
+        corrected={row.key: row.here for row in corrected},
+        corrected_uncertainty=_uncertainties(corrected),
         paper={key: one.value for key, one in published.items()},
         paper_rounding={key: one.rounding for key, one in published.items()},
         differs={row.key: row.differs for row in results if row.published is not None},
-        explanation={row.key: row.explanation for row in (*results, *chip, *rows["camera"])},
+        explanation={
+            row.key: row.explanation for row in (*results, *chip, *corrected, *rows["camera"])
+        },
         provenance=dict(provenance),
         missing=list(analysis.missing),
         failed=dict(analysis.failed),
     )
+
+
+def _uncertainties(rows: Sequence[Row]) -> dict[str, float]:
+    return {row.key: row.uncertainty for row in rows if row.uncertainty is not None}
 
 
 def _causes(draws: Distribution) -> dict[str, Cause]:

@@ -212,7 +212,7 @@ class CameraSection(CameraSettings, CameraModel):
             return self.lower_limit
         if self.detector is None:
             raise ValueError("lower_limit: detector requires a detector")
-        point = OperationPoint(band, self.integration_time, self.frame_rate, self.fill_factor)
+        point = made_from(OperationPoint, self, band=band)
         limit = lower_range_limit(self.detector, point)
         return limit if limit > COLDEST else None
 

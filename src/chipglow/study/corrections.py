@@ -1,14 +1,10 @@
 """Correction of measurements with the camera, emissivity and outlines of a study."""
 
-import numpy as np
-
-from chipglow.camera import Camera, Measurement
-from chipglow.correction import Correction, correct, joined, observed_scene
-from chipglow.quantities.units import COLDEST
+from chipglow.camera import Measurement
+from chipglow.correction import Correction, correct, joined, observed_scene, surroundings_of
 from chipglow.study.running import Progress, fitted_study, silent
 from chipglow.study.schema import Study
 from chipglow.text import Notes
-from chipglow.uncertainty import Estimate
 
 
 def correct_study(
@@ -66,18 +62,13 @@ def correct_study(
                     observed,
                     psf_uncertainty=psf_uncertainty,
                     outline_uncertainty=outline_uncertainty,
-                    surroundings=_surroundings(camera),
+                    surroundings=surroundings_of(camera),
                     noise=noise,
                     seed=study.seed + frame,
                 )
             )
             progress("correction", (frame + 1) / len(measurement))
     return joined(corrected).with_notes(fitted.notes + _assumed(emissivity_uncertainty))
-
-
-def _surroundings(camera: Camera) -> Estimate:
-    """Return the reflected temperature; dark surroundings hardly radiate at the lowest one."""
-    return Estimate(np.array(COLDEST if camera.reflected is None else camera.reflected))
 
 
 def _assumed(uncertainty: float) -> Notes:

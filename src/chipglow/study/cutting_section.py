@@ -1,17 +1,15 @@
 """The section of the cut: the paper's Table 2 by default."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, ValidationInfo
 
 from chipglow.cutting import (
+    CutSettings,
     CuttingConditions,
     CuttingSimulation,
-    Friction,
-    Numerics,
     OutputWindow,
-    Surroundings,
     ToolBody,
     WorkpieceMaterial,
     is_own_file,
@@ -83,8 +81,8 @@ def _known(name: str, info: ValidationInfo) -> str:
 
 
 @dataclass(frozen=True)
-class CuttingSection(CuttingConditions):
-    """The cutting simulation; the paper's Table 2."""
+class WorkpieceAndTool(CuttingConditions):
+    """What is cut with which tool, and how fast."""
 
     workpiece: Annotated[
         str,
@@ -106,16 +104,12 @@ class CuttingSection(CuttingConditions):
     tool: Annotated[CutToolSection, Parameter("The cutting tool.")] = field(
         default_factory=CutToolSection
     )
-    friction: Annotated[Friction, Parameter("Friction between chip and tool.")] = field(
-        default_factory=Friction
-    )
-    surroundings: Annotated[
-        Surroundings,
-        Parameter("Surroundings to which chip, workpiece and tool lose heat; none by default."),
-    ] = field(default_factory=Surroundings)
-    numerics: Annotated[Numerics, Parameter("Cells and time steps of the computation.")] = field(
-        default_factory=Numerics
-    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class CuttingSection(CutSettings, WorkpieceAndTool):
+    """The cutting simulation; the paper's Table 2."""
+
     window: Annotated[OutputWindow, Parameter("The part of the cut that becomes the scene.")] = (
         field(default_factory=OutputWindow)
     )
@@ -144,14 +138,13 @@ class CuttingSection(CuttingConditions):
 
     def simulation(self) -> CuttingSimulation:
         """Return the simulation of a region that holds the field of view."""
-        conditions = {one.name: getattr(self, one.name) for one in fields(CuttingConditions)}
-        return CuttingSimulation(
-            conditions=CuttingConditions(**conditions),
+        return made_from(
+            CuttingSimulation,
+            self,
+            conditions=made_from(CuttingConditions, self),
             tool=self.tool.build(),
             workpiece=self.material(),
             tool_material=tool_material(self.tool.material),
-            friction=self.friction,
             numerics=self.numerics.around(self.field_of_view.build()),
-            surroundings=self.surroundings,
             tool_temperature=self.tool.start(),
         )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from html import escape
 from typing import Annotated, Any, Self
 
-from chipglow.analysis import AttributionPlan, Plan, WavelengthPlan
+from chipglow.analysis import AttributionPlan, CorrectionPlan, Plan, WavelengthPlan
 from chipglow.camera import AnnularAperturePSF
 from chipglow.quantities import FileBeside, Parameter, Part, changed, value_at
 from chipglow.study.camera_section import CameraSection
@@ -65,6 +65,14 @@ class Study(Part):
         Parameter("Effects among which the error of each pixel is divided; none: it is not."),
     ] = field(default_factory=AttributionPlan)
 
+    correction: Annotated[
+        bool,
+        Parameter(
+            "Whether the report of a cut corrects rake face and shear band for all that is known. "
+            "Standard uncertainties are those of uncertainty.inputs, else that of the heated chip."
+        ),
+    ] = True
+
     wavelengths: Annotated[
         WavelengthPlan, Parameter("Bands that chipglow wavelengths compares, alone and as ratios.")
     ] = field(default_factory=WavelengthPlan)
@@ -80,7 +88,8 @@ class Study(Part):
     @property
     def plan(self) -> Plan:
         """The plan of the analysis, with PSF widths around the camera's."""
-        plan = replace(self.analysis, attribution=self.attribution)
+        known = self._known() if self.correction else None
+        plan = replace(self.analysis, attribution=self.attribution, correction=known)
         psf = self.camera.build().psf
         ratio = 1.0 if psf is None else psf.fwhm / AnnularAperturePSF().fwhm
         if "psf_widths" not in self.analysis.given and ratio != 1.0:
@@ -90,6 +99,20 @@ class Study(Part):
             return plan
         (name,) = surface_names(self.surface)
         return replace(plan, rake_chip=name, band_chip=name)
+
+    def _known(self) -> CorrectionPlan:
+        """Return the uncertainties of emissivity and PSF width among the inputs of the budget."""
+        inputs = {one.name: one for one in self.uncertainty.build(self).inputs}
+        width = inputs.get("camera.psf.fwhm", inputs.get("camera.psf.numerical_aperture"))
+        emissivity = {}
+        for surface in surface_names(self.surface):
+            paths = f"surface.chips.{surface}.body.mean", "surface.emissivity"
+            for path in paths:
+                if path in inputs:
+                    emissivity[surface] = inputs[path].standard_uncertainty
+        return CorrectionPlan(
+            emissivity, 0.0 if width is None else width.standard_uncertainty / width.value
+        )
 
     def with_steady_tool(self) -> Self:
         """Return the same study with a tool at steady-state temperature."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Final
 
 from chipglow.laboratory.emissivity import (
     SurfaceFile,
@@ -12,7 +12,7 @@ from chipglow.laboratory.emissivity import (
     read_emissivity_map,
     read_origin,
 )
-from chipglow.quantities import FileBeside, Parameter, Part
+from chipglow.quantities import FileBeside, Parameter, Part, made_from
 from chipglow.quantities.units import WAVELENGTHS
 from chipglow.radiometry import Band
 from chipglow.surface import (
@@ -28,6 +28,7 @@ from chipglow.surface import (
     Direction,
     Dispersion,
     Emissivity,
+    FeatureSettings,
     FeatureSurface,
     FeatureTrends,
     Modifier,
@@ -42,15 +43,12 @@ CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2
 """Chips of the paper's Table 1 by the names of a study."""
 
 
-_declared = FeatureSurface.parameter
-
-
 @dataclass(frozen=True)
 class ChipSection(Part):
     """Emissivity of one chip."""
 
-    body: Annotated[Emissivity, _declared("chip")]
-    shear_band: Annotated[Emissivity, _declared("shear_band")]
+    body: Annotated[Emissivity, FeatureSurface.parameter("chip")]
+    shear_band: Annotated[Emissivity, FeatureSurface.parameter("shear_band")]
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> Any:
@@ -68,12 +66,10 @@ class ChipSection(Part):
         return {"body": chip.chip, "shear_band": chip.shear_band}
 
 
-@SURFACES.part
 @dataclass(frozen=True)
-class FeaturesSection(Part):
-    """The emissivity of each feature of a chip, each with its texture."""
+class Chips(Part):
+    """Chips that are laid on the same scene, each by its name."""
 
-    kind: ClassVar[str] = "features"
     chips: Annotated[
         dict[str, ChipSection],
         Parameter(
@@ -103,11 +99,29 @@ class FeaturesSection(Part):
             allowed="{} or names and files beside this one: {heated chip: emissivity.nc}",
         ),
     ] = field(default_factory=dict)
-    workpiece: Annotated[Emissivity, _declared("workpiece")] = FeatureSurface.workpiece
-    tool: Annotated[Emissivity, _declared("tool")] = FeatureSurface.tool
-    grain: Annotated[float, _declared("grain")] = FeatureSurface.grain
-    follow: Annotated[Literal["material", "mean", "none"], _declared("follow")] = "material"
-    restore_standard_deviation: Annotated[bool, _declared("restore_standard_deviation")] = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.chips:
+            raise ValueError("chips: {} is empty, must have a chip such as chip 1: chip-1")
+        taken = set(self.chips)
+        for kind in ("maps", "measured"):
+            for name in getattr(self, kind):
+                if name in taken:
+                    raise ValueError(f"{kind}: {name!r} is the name of another chip too")
+            taken |= getattr(self, kind).keys()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*self.chips, *self.maps, *self.measured)
+
+
+@SURFACES.part
+@dataclass(frozen=True, kw_only=True)
+class FeaturesSection(FeatureSettings, Chips):
+    """The emissivity of each feature of a chip, each with its texture."""
+
+    kind: ClassVar[str] = "features"
     spectral: Annotated[
         Annotated[SpectralSurface, SPECTRA] | None,
         Parameter(
@@ -146,21 +160,6 @@ class FeaturesSection(Part):
         ),
     ] = None
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.chips:
-            raise ValueError("chips: {} is empty, must have a chip such as chip 1: chip-1")
-        taken = set(self.chips)
-        for kind in ("maps", "measured"):
-            for name in getattr(self, kind):
-                if name in taken:
-                    raise ValueError(f"{kind}: {name!r} is the name of another chip too")
-            taken |= getattr(self, kind).keys()
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return (*self.chips, *self.maps, *self.measured)
-
     def build(self, seed: int) -> dict[str, Surface]:
         chips = {
             name: self._features(chip.body, chip.shear_band, seed)
@@ -175,15 +174,14 @@ class FeaturesSection(Part):
         return {name: surface.modified(*modifiers) for name, surface in bare.items()}
 
     def _features(self, chip: Emissivity, shear_band: Emissivity, seed: int) -> FeatureSurface:
-        shared = FeatureSurface.declared().keys() & self.declared().keys()
-        values = {name: getattr(self, name) for name in shared}
         papers = any((chip, shear_band) == (one.chip, one.shear_band) for one in CHIPS.values())
         origin = PAPER_ORIGIN if papers else Origin()
         if "measured_in" in self.given:
             origin = replace(origin, band=self.measured_in)
         if self.measured_on is not None:
             origin = replace(origin, metal=self.measured_on)
-        return FeatureSurface(chip, shear_band, seed=seed, origin=origin, **values)
+        made = {"chip": chip, "shear_band": shear_band, "seed": seed, "origin": origin}
+        return made_from(FeatureSurface, self, **made)
 
     def _measured(self, file: str, seed: int) -> Surface:
         try:

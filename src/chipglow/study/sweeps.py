@@ -232,8 +232,9 @@ def sweep(
     tell, folder = progress or (lambda step, done: None), Path(out)
     axes = {path: axis(values) for path, values in vary.items()}
     points = list(points_of(axes, method, samples, seed))
-    # Neither is kept of a point, and each takes longer than the rest.
-    study = changed(study, {"analysis.psf_widths": ("8 um",), "attribution": None})
+    # None of these is kept of a point, and each takes longer than the rest.
+    left_out = {"analysis.psf_widths": ("8 um",), "attribution": None, "correction": False}
+    study = changed(study, left_out)
     studies = studies_at(study, points)
     settings = [{path: in_si(study, path, one[path]) for path in one} for one in points]
     quantities = {path: quantity_of(study, path) for path in axes}

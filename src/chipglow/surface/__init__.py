@@ -12,6 +12,7 @@ from chipglow.surface.feature import (
     PAPER_ORIGIN as PAPER_ORIGIN,
     EmissivityStack as EmissivityStack,
     Features as Features,
+    FeatureSettings as FeatureSettings,
     FeatureSurface as FeatureSurface,
     FeatureTrends as FeatureTrends,
     chip_fraction as chip_fraction,

@@ -36,8 +36,32 @@ _WORKPIECE, _TOOL_SIDE = Emissivity(0.40, 0.03), Emissivity(0.58, 0.06)
 """The paper's Table 1."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class FeatureSettings(Part):
+    """Settings of a `FeatureSurface` that a study states once for all its chips."""
+
+    workpiece: Annotated[
+        Emissivity, Parameter("The uncut workpiece; the paper assumed these numbers.")
+    ] = _WORKPIECE
+    tool: Annotated[Emissivity, Parameter("The tool's side.")] = _TOOL_SIDE
+    grain: Annotated[float, Parameter("Size of a grain of the emissivity's texture.", LENGTH)] = (
+        20e-6
+    )
+    follow: Annotated[
+        Literal["material", "mean", "none"],
+        Parameter(
+            "How textures move: material (each point keeps its own, by the scene's material "
+            "coordinates), mean (the paper's shift by the feature's mean velocity) or none."
+        ),
+    ] = "material"
+    restore_standard_deviation: Annotated[
+        bool,
+        Parameter("Make up for the standard deviation that is lost when a texture is enlarged."),
+    ] = True
+
+
 @dataclass(frozen=True)
-class FeatureSurface(Surface, Part):
+class FeatureSurface(FeatureSettings, Surface):
     """Emissivity of workpiece, chip, shear band and tool, each with a random texture.
 
     Raises
@@ -56,27 +80,9 @@ class FeatureSurface(Surface, Part):
 
     chip: Annotated[Emissivity, Parameter("Body of the chip's segments.")]
     shear_band: Annotated[Emissivity, Parameter("Shear bands: the paper's fissures.")]
-    workpiece: Annotated[
-        Emissivity, Parameter("The uncut workpiece; the paper assumed these numbers.")
-    ] = _WORKPIECE
-    tool: Annotated[Emissivity, Parameter("The tool's side.")] = _TOOL_SIDE
-    grain: Annotated[float, Parameter("Size of a grain of the emissivity's texture.", LENGTH)] = (
-        20e-6
-    )
-    follow: Annotated[
-        Literal["material", "mean", "none"],
-        Parameter(
-            "How textures move: material (each point keeps its own, by the scene's material "
-            "coordinates), mean (the paper's shift by the feature's mean velocity) or none."
-        ),
-    ] = "material"
     seed: Annotated[
         int, Parameter("Seed of the textures; each feature has a separate stream.", least=0)
     ] = 2010
-    restore_standard_deviation: Annotated[
-        bool,
-        Parameter("Make up for the standard deviation that is lost when a texture is enlarged."),
-    ] = True
     origin: Origin = UNKNOWN  # type: ignore[misc]
 
     @cached_property

@@ -28,17 +28,24 @@ in_tables: Final = partial(Parameter, quantity=TEMPERATURE, least=COLDEST, most=
 """Declares a temperature at which a band's radiance is known."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class ExposureSettings(Part):
+    """How long and with which area the elements of a detector take light."""
+
+    integration_time: Annotated[float, Parameter("Exposure time.", TIME)] = 10e-6
+    frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY)] = 600.0
+    fill_factor: Annotated[
+        float,
+        Parameter("Sensitive fraction of the pixel area, a centred square.", over=0.0, most=1.0),
+    ] = 1.0
+
+
 @dataclass(frozen=True)
-class OperationPoint(Part):
+class OperationPoint(ExposureSettings):
     """How a camera uses its detector (EMVA 1288: the operation point)."""
 
     band: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
     """With the relative spectral response."""
-    integration_time: Annotated[float, Parameter("Exposure.", TIME)] = 10e-6
-    frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY)] = 600.0
-    fill_factor: Annotated[
-        float, Parameter("Fraction of an element's square that takes light.", over=0.0)
-    ] = 1.0
 
     @property
     def frame_time(self) -> float:

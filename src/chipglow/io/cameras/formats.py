@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from chipglow.camera import Recording
+from chipglow.camera.recording import Quantity
 from chipglow.io.cameras.cine import Cine
 from chipglow.io.cameras.flir import Flir, has_packed_counts
 from chipglow.io.cameras.hcc import Hcc
@@ -122,7 +123,7 @@ def read_recording(
     frames: slice | None = None,
     format: str | None = None,
     *,
-    quantity: str | None = None,
+    quantity: Quantity | None = None,
     unit: str | None = None,
     interval: float | None = None,
     dataset: str | None = None,
@@ -174,7 +175,16 @@ def read_recording(
     OSError
         If it is missing or not accessible.
     """
-    stated = Stated(quantity, unit, interval, dataset, axes, scale, offset, void_value)
+    stated = Stated(
+        quantity=quantity,
+        unit=unit,
+        interval=interval,
+        dataset=dataset,
+        axes=None if axes is None else tuple(axes),
+        scale=scale,
+        offset=offset,
+        void_value=void_value,
+    )
     path = Path(path)
     if format is not None and format not in camera_formats():
         raise ValueError(f"format: is {format!r}, expected one of {', '.join(camera_formats())}")

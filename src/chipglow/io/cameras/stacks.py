@@ -1,25 +1,25 @@
 """Frames in files of arrays, whose quantity and unit the user states."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera import Recording
-from chipglow.camera.recording import QUANTITIES, Quantity
+from chipglow.camera.recording import Quantity
 from chipglow.io.cameras.binary import chosen_frames, evenly
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.conventions import note_other_unit
 from chipglow.io.sources.grids.arrays import ARRAY_READERS, open_arrays
 from chipglow.io.sources.grids.file_array import FileArray
 from chipglow.io.sources.grids.layout import (
-    AXES,
     ROW_0,
+    ArrayNumbers,
     ascends,
     axes_of,
     coordinate,
@@ -35,7 +35,8 @@ from chipglow.io.sources.grids.layout import (
 )
 from chipglow.io.sources.plausible import check_sides, check_temperatures, check_tenths
 from chipglow.io.sources.source import check_times, span_of
-from chipglow.quantities.units import SI, Unit, parse_unit
+from chipglow.quantities import Parameter
+from chipglow.quantities.units import SI, TIME, Unit, parse_unit
 from chipglow.scene import Raster
 from chipglow.text import Notes
 
@@ -61,34 +62,35 @@ def recording_unit(text: str) -> tuple[Quantity, Unit] | None:
 
 
 @dataclass(frozen=True)
-class Stated:
+class Stated(ArrayNumbers):
     """Statements of the user on a file without them; see `read_recording`."""
 
-    quantity: str | None = None
-    unit: str | None = None
-    interval: float | None = None
-    dataset: str | None = None
-    axes: Sequence[str] | None = None
-    scale: float | None = None
-    offset: float | None = None
-    void_value: float | None = None
+    quantity: Annotated[
+        Quantity | None,
+        Parameter(
+            "Quantity of the numbers, for files that do not state it.",
+            allowed="none, counts, radiance, temperature",
+        ),
+    ] = None
+    unit: Annotated[
+        str | None,
+        Parameter(
+            "Their unit, instead of the one that the file states.",
+            allowed="none, counts, W/m2/sr, K, degC, degF, cK, 0.01 K, ...",
+        ),
+    ] = None
+    interval: Annotated[
+        float | None, Parameter("Time from frame to frame; none: as the file says.", TIME)
+    ] = None
+    dataset: Annotated[str | None, Parameter("Which array of the file, if it has several.")] = None
 
     def __post_init__(self) -> None:
-        if self.quantity is not None and self.quantity not in QUANTITIES:
-            raise ValueError(
-                f"quantity: is {self.quantity!r}, expected one of {', '.join(QUANTITIES)}"
-            )
+        super().__post_init__()
         unit = None if self.unit is None else recording_unit(self.unit)
         if self.unit is not None and unit is None:
             raise ValueError(f"unit: is {self.unit!r}, expected {_EXPECTED}")
         if unit is not None and self.quantity not in (None, unit[0]):
             raise ValueError(f"unit: {self.quantity} is not in {self.unit}")
-        if self.interval is not None and not 0 < self.interval < float("inf"):
-            raise ValueError(f"interval: is {self.interval!r} s, expected more than 0")
-        if self.axes is not None and sorted(self.axes) not in (sorted(AXES), ["x", "y"]):
-            raise ValueError(f"axes: are {', '.join(self.axes)}, expected {', '.join(AXES)}")
-        if self.scale is not None and not 0 < self.scale < float("inf"):
-            raise ValueError(f"scale: is {self.scale!r}, expected more than 0")
 
 
 def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> Recording:

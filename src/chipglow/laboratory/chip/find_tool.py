@@ -17,24 +17,81 @@ from chipglow.scene import Raster, ToolGeometry
 from chipglow.text import Notes
 
 _REACH: Final = 6
+"""Pixels of a row on either side of a line that tell how well it fits."""
+
 _SEARCH: Final = radians(20.0)
+"""Largest difference of the rake angle from the assumed one, in rad."""
+
 _STEP: Final = radians(1.0)
-_ROOM: Final = tan(radians(4.0))
+"""Step of the searched rake angles in rad."""
+
+_SLOPE_RANGE: Final = tan(radians(4.0))
+"""Largest change of the slope of a line after the search: four of its steps."""
+
 _COARSE_BLUR: Final = 1.0
-_DECAYS: Final = (2.0, 6.0)
+"""Standard deviation in pixels of the blur of a break, in the search."""
+
+_DECAY_LENGTHS: Final = (2.0, 6.0)
+"""Distances in pixels over which the fitted courses fall off with the distance from the face."""
+
+_PLACE_RANGE: Final = 3.0
+"""Largest change of the place of a line in the fit, in pixels: half of what its pixels reach."""
+
+_BLURS: Final = (0.4, 3.0)
+"""Smallest and largest standard deviation of the fitted blur in pixels: more than the 0.29 of
+a pixel's own area, and half of what the pixels reach."""
+
+_BLUR_STARTS: Final = (0.5, 2.9)
+"""Range of the blur from which a fit starts, within that of the fit."""
+
+_OUTLIER: Final = 0.02
+"""Residual, as a fraction of the level, beyond which a pixel counts less (soft L1)."""
+
+_SMOOTH_TERMS: Final = 5
+"""Terms of the polynomial of a row without a break: nearly the 6 terms with one, so that a gain is
+that of the break."""
+
 _CONTRAST_LIMIT: Final = 0.3
-_DARK: Final = 0.02
-_NOT_NOISE: Final = 8.0
-_SURE: Final = 10.0
-_AS_GOOD: Final = 0.7
-_HAS_FACE: Final = 0.5
-_APART: Final = (7, 9)
+"""Largest gain of a row in the search, as a fraction of its level, so that no few rows of high
+contrast outweigh the others."""
+
+_DARK_FRACTION: Final = 0.02
+"""Fraction of the brightest radiance that keeps the level of a dark row off 0."""
+
+_MIN_PROMINENCE: Final = 8.0
+"""Smallest prominence of a line that is not noise: its score above the median of all lines, in
+median absolute deviations."""
+
+_SURE_PROMINENCE: Final = 10.0
+"""Prominence below which the line is doubted."""
+
+_RIVAL_SCORE: Final = 0.7
+"""Fraction of the best score from which the score of another line is about as good."""
+
+_FACE_GAIN: Final = 0.5
+"""Fraction of the typical gain, that of the better half of the rows, from which a row shows the
+face."""
+
+_PEAK_SIZE: Final = (7, 9)
+"""Steps of the angle and pixels within which only the best line is kept."""
+
 _FEWEST_ROWS: Final = 12
+"""Fewest rows that show the face: four for each of the fitted place, slope and blur."""
+
 _BLOCKS: Final = 8
-_WORST_ROWS: Final = 3.0
-_WORST_ANGLE: Final = radians(1.0)
+"""Blocks of rows of the jackknife."""
+
+_MAX_RESIDUAL: Final = 3.0
+"""Residual of a row, in the rows' median, above which it is left out."""
+
+_DOUBTED_ANGLE: Final = radians(1.0)
+"""Standard uncertainty of the rake angle in rad above which the line is doubted."""
+
 _TIP_PIXELS: Final = 2.0
-_SHIFT: Final = 0.5 / sqrt(3.0)
+"""Standard uncertainty of the tip along the face in pixels."""
+
+_LINE_SHIFT: Final = 0.5 / sqrt(3.0)
+"""Standard uncertainty in pixels of a line that may be off by half a pixel (rectangular)."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +138,7 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
         raise _not_found(f"only {rows.size} rows of the image show one")
     fit = _fit(image, rows, _best_start(image, rows, start))
     residuals = np.sqrt((_Strip(fit, image, rows).residuals(fit) ** 2).mean(axis=-1))
-    rows = rows[residuals <= _WORST_ROWS * np.median(residuals)]
+    rows = rows[residuals <= _MAX_RESIDUAL * np.median(residuals)]
     fit = _fit(image, rows, fit)
     angle_error, place_error = _jackknife(image, rows, fit)
     angle = atan(fit[1])
@@ -90,8 +147,8 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
     middle = raster.top - pitch * (float(rows.mean()) + 0.5)
     uncertainty = ToolUncertainty(
         along=sqrt((_TIP_PIXELS * pitch) ** 2 + (shape.edge_radius / 2) ** 2),
-        across=pitch * sqrt(place_error**2 + _SHIFT**2),
-        angle=sqrt(angle_error**2 + 2 * (2 * _SHIFT / rows.size) ** 2),
+        across=pitch * sqrt(place_error**2 + _LINE_SHIFT**2),
+        angle=sqrt(angle_error**2 + 2 * (2 * _LINE_SHIFT / rows.size) ** 2),
         pivot=(middle - float(tool.rake_foot[1])) / cos(tool.rake_angle),
     )
     assumed = (
@@ -99,8 +156,9 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
         f"{1e6 * shape.corner_radius:.3g} um."
     )
     doubts = {
-        "The rake face hardly stands out from the noise of the image.": prominence < _SURE,
-        "The rows of the image do not agree on the rake angle.": angle_error > _WORST_ANGLE,
+        "The rake face hardly stands out from the noise of the image.": prominence
+        < _SURE_PROMINENCE,
+        "The rows of the image do not agree on the rake angle.": angle_error > _DOUBTED_ANGLE,
         "The rows of the image do not agree on a line within a pixel.": place_error > 1.0,
         f"The rake angle of {degrees(angle):.1f} degrees is at the limit of the search range.": (
             not angles[0] < angle < angles[-1]
@@ -127,9 +185,9 @@ def _best_line(image: Array, angles: Array) -> tuple[Array, float]:
     spread = float(np.median(np.abs(scores - middle)))
     best = float(scores.max())
     prominence = (best - middle) / max(spread, 1e-12)
-    if not prominence > _NOT_NOISE:
+    if not prominence > _MIN_PROMINENCE:
         raise _not_found("nothing stands out from the noise")
-    peaks = (scores == maximum_filter(scores, size=_APART)) & (scores >= _AS_GOOD * best)
+    peaks = (scores == maximum_filter(scores, size=_PEAK_SIZE)) & (scores >= _RIVAL_SCORE * best)
     at_angle, at_place = np.nonzero(peaks)
     right = int(at_place.argmax())
     place, slope = at_place[right] + _REACH, tan(angles[at_angle[right]])
@@ -157,7 +215,7 @@ def _gain(windows: Array, place: Array, blur: float, image: Array) -> Array:
     """Return the root mean square that a break explains, as a fraction of the level."""
     steps = np.arange(-_REACH, _REACH + 1.0)
     basis = _parabolas(steps - place[..., None] if np.any(place) else steps, blur)
-    smooth = np.stack([steps**power for power in range(5)], axis=-1)
+    smooth = np.stack([steps**power for power in range(_SMOOTH_TERMS)], axis=-1)
     explained = (_residuals(windows, smooth) ** 2).sum(axis=-1)
     explained -= (_residuals(windows, basis) ** 2).sum(axis=-1)
     explained = np.sqrt(np.maximum(explained, 0.0) / steps.size)
@@ -166,7 +224,7 @@ def _gain(windows: Array, place: Array, blur: float, image: Array) -> Array:
 
 def _level(windows: Array, image: Array) -> Array:
     """Return the mean radiance of each window, kept off 0 by 2 % of the brightest in the image."""
-    return np.asarray(windows.mean(axis=-1) + _DARK * np.percentile(image, 99.0))
+    return np.asarray(windows.mean(axis=-1) + _DARK_FRACTION * np.percentile(image, 99.0))
 
 
 def _parabolas(offset: Array, blur: float) -> Array:
@@ -182,7 +240,7 @@ def _decays(offset: Array, blur: float) -> Array:
     courses = []
     for away in (offset, -offset):
         courses.append(ndtr(away / blur))
-        for length in _DECAYS:
+        for length in _DECAY_LENGTHS:
             fall = np.exp(blur**2 / (2 * length**2) - away / length)
             courses.append(fall * ndtr(away / blur - blur / length))
     return np.stack(courses, axis=-1)
@@ -225,15 +283,15 @@ def _rows_with_face(image: Array, line: Array) -> NDArray[np.int64]:
     strip = _Strip(line, image, rows)
     gain = _gain(strip.windows, strip.place(line), line[2], image)
     typical = np.median(np.sort(gain)[-rows.size // 2 :])
-    return np.asarray(rows[gain > _HAS_FACE * typical], dtype=np.int64)
+    return np.asarray(rows[gain > _FACE_GAIN * typical], dtype=np.int64)
 
 
 def _best_start(image: Array, rows: NDArray[np.int64], start: Array) -> Array:
     """Return the best of the lines around one: the least squares have several minima."""
     lines = [
         start + np.array([place, slope, 0.0])
-        for place in np.linspace(-4.0, 4.0, 17)
-        for slope in np.linspace(-_ROOM, _ROOM, 9)
+        for place in np.linspace(-4.0, 4.0, 17)  # half a pixel apart
+        for slope in np.linspace(-_SLOPE_RANGE, _SLOPE_RANGE, 9)  # a degree apart
     ]
     left = [np.abs(_Strip(line, image, rows).residuals(line)).sum() for line in lines]
     return np.asarray(lines[int(np.argmin(left))], dtype=np.float64)
@@ -243,15 +301,16 @@ def _fit(image: Array, rows: NDArray[np.int64], start: Array) -> Array:
     """Fit column in the middle row, slope and width of the blur in pixels."""
     # Windows that moved with the line would make the sum of squares jump.
     strip = _Strip(start, image, rows)
-    room = np.array([3.0, _ROOM])
+    room = np.array([_PLACE_RANGE, _SLOPE_RANGE])
     lower, upper = start[:2] - room, start[:2] + room
+    least_blur, most_blur = _BLURS
     found = scipy.optimize.least_squares(
         lambda line: strip.residuals(line).ravel(),
-        [start[0], start[1], np.clip(start[2], 0.5, 2.9)],
-        bounds=([*lower, 0.4], [*upper, 3.0]),
-        x_scale=[1.0, 0.05, 1.0],
+        [start[0], start[1], np.clip(start[2], *_BLUR_STARTS)],
+        bounds=([*lower, least_blur], [*upper, most_blur]),
+        x_scale=[1.0, 0.05, 1.0],  # a pixel, 3 degrees, a pixel
         loss="soft_l1",
-        f_scale=0.02,
+        f_scale=_OUTLIER,
     )
     return np.asarray(found.x, dtype=np.float64)
 

@@ -7,10 +7,11 @@ from typing import Annotated, Any, Final, Literal
 import numpy as np
 
 from chipglow.camera import MODELS, FittedCalibration
+from chipglow.camera.recording import MeasuringRange
 from chipglow.io import atomic_path
 from chipglow.laboratory.recordings.calibration_fit import CalibrationFit
-from chipglow.quantities import ZERO_CELSIUS, Parameter, Part
-from chipglow.quantities.units import TEMPERATURE, TIME, WAVELENGTHS
+from chipglow.quantities import ZERO_CELSIUS, Parameter
+from chipglow.quantities.units import TEMPERATURE, WAVELENGTHS
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.text import commented_yaml, load_described
 
@@ -20,7 +21,7 @@ PointRow = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class CalibrationDescription(Part):
+class CalibrationDescription(MeasuringRange):
     """A calibration of a camera's counts by blackbodies."""
 
     model: Annotated[
@@ -41,16 +42,6 @@ class CalibrationDescription(Part):
     highest: Annotated[
         float, Parameter("Hottest blackbody: hotter pixels are flagged.", TEMPERATURE)
     ]
-    integration_time: Annotated[
-        float | None,
-        Parameter("Integration time for which it holds; none: not stated, not checked.", TIME),
-    ] = None
-    range: Annotated[
-        str | None,
-        Parameter(
-            "The camera's measuring range for which it holds; none: not stated, not checked."
-        ),
-    ] = None
     parameters: Annotated[
         dict[str, float],
         Parameter("offset and C in counts, gain in counts per W/(m^2 sr), A in m, B in m K."),
@@ -89,7 +80,7 @@ class CalibrationDescription(Part):
             lowest=calibration.lowest,
             highest=calibration.highest,
             integration_time=calibration.integration_time,
-            range=calibration.range_name,
+            range=calibration.range,
             parameters=dict(zip(calibration.NAMES, calibration.parameters.tolist(), strict=True)),
             covariance=tuple(map(tuple, calibration.covariance.tolist())),
             warnings=calibration.warnings,
@@ -117,7 +108,7 @@ class CalibrationDescription(Part):
             lowest=self.lowest,
             highest=self.highest,
             integration_time=self.integration_time,
-            range_name=self.range,
+            range=self.range,
             parameters=np.array([self.parameters[name] for name in kind.NAMES]),
             covariance=np.array(self.covariance),
             warnings=self.warnings,

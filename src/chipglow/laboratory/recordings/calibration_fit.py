@@ -169,7 +169,7 @@ def fit_calibration(
         lowest=float(kelvins.min()),
         highest=float(kelvins.max()),
         integration_time=integration_time,
-        range_name=range_name,
+        range=range_name,
         parameters=start,
         covariance=np.zeros((start.size, start.size)),
     )

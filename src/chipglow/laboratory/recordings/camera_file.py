@@ -21,7 +21,7 @@ from chipglow.camera import (
 from chipglow.io import is_measurement, is_scene, read_measurement
 from chipglow.io.cameras import camera_formats, read_recording
 from chipglow.io.cameras.formats import find_format
-from chipglow.io.cameras.stacks import MissingError
+from chipglow.io.cameras.stacks import MissingError, Stated
 from chipglow.io.column_file import read_bad_pixels
 from chipglow.io.sources.file_names import files_of
 from chipglow.laboratory.recordings.calibration_file import load_calibration
@@ -83,14 +83,7 @@ def _read(description: MeasurementDescription, file: str) -> Recording:
         file,
         description.chosen_frames(),
         description.format,
-        quantity=description.quantity,
-        unit=description.unit,
-        interval=description.interval,
-        dataset=description.dataset,
-        axes=description.axes,
-        scale=description.scale,
-        offset=description.offset,
-        void_value=description.void_value,
+        **{name: getattr(description, name) for name in Stated.declared()},
     )
 
 

@@ -5,15 +5,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from math import isclose
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
 from pydantic import BeforeValidator, ValidationInfo
 
 from chipglow.camera import Recording
+from chipglow.camera.recording import RecordingSettings
+from chipglow.io.cameras.stacks import Stated
 from chipglow.io.column_file import read_response
-from chipglow.laboratory.recordings.radiometric_calibration import ImagePosition, Mirror, Pixels
-from chipglow.quantities import FileBeside, Parameter, Part, beside_the_study
-from chipglow.quantities.units import LENGTH, TEMPERATURE, TIME, WAVELENGTHS
+from chipglow.laboratory.recordings.radiometric_calibration import ImagePosition
+from chipglow.quantities import FileBeside, Parameter, Part, beside_the_study, made_from
+from chipglow.quantities.units import TEMPERATURE, WAVELENGTHS
 from chipglow.radiometry import Band, ObjectParameters
 from chipglow.text import Notes, commented_yaml, described_by
 
@@ -47,13 +49,8 @@ def band_of(text: str) -> Band:
 
 
 @dataclass(frozen=True)
-class ObjectSection(Part):
+class ObjectSection(Part, overrides=ObjectParameters):
     """The camera's object parameters, if they are missing or wrong in the file."""
-
-    emissivity: Annotated[float | None, ObjectParameters.parameter("emissivity")] = None
-    reflected: Annotated[float | None, ObjectParameters.parameter("reflected")] = None
-    transmittance: Annotated[float | None, ObjectParameters.parameter("transmittance")] = None
-    atmosphere: Annotated[float | None, ObjectParameters.parameter("atmosphere")] = None
 
     def applied_to(self, recorded: ObjectParameters | None) -> ObjectParameters | None:
         """Override recorded object parameters by this section."""
@@ -81,8 +78,8 @@ class FlatFieldSection(Part):
 
 
 @dataclass(frozen=True)
-class MeasurementDescription(Part):
-    """A measurement from a camera file: contents, position, and conversion."""
+class CameraFile(Part):
+    """Which frames of which file."""
 
     file: Annotated[
         FileBeside | None,
@@ -101,45 +98,21 @@ class MeasurementDescription(Part):
             allowed="none, 100:200, ::10",
         ),
     ] = None
-    dataset: Annotated[str | None, Parameter("Which array of the file, if it has several.")] = None
-    axes: Annotated[
-        tuple[str, ...] | None,
-        Parameter(
-            "Order of the array's axes; none: as the file says.", allowed="none, or [time, y, x]"
-        ),
-    ] = None
-    quantity: Annotated[
-        Literal["counts", "radiance", "temperature"] | None,
-        Parameter(
-            "Quantity of the numbers, for files that do not state it.",
-            allowed="none, counts, radiance, temperature",
-        ),
-    ] = None
-    unit: Annotated[
-        str | None,
-        Parameter(
-            "Their unit, instead of the one that the file states.",
-            allowed="none, counts, W/m2/sr, K, degC, degF, cK, 0.01 K, ...",
-        ),
-    ] = None
-    scale: Annotated[
-        float | None,
-        Parameter(
-            "Temperature or radiance is scale x number + offset in the unit; none: 1.",
-            over=0.0,
-            allowed="none, 0.04",
-        ),
-    ] = None
-    offset: Annotated[float | None, Parameter("See scale; none: 0.", allowed="none, -40")] = None
-    void_value: Annotated[
-        float | None, Parameter("Number in the file that stands for no value; NaN always does.")
-    ] = None
-    interval: Annotated[
-        float | None, Parameter("Time from frame to frame; none: as the file says.", TIME)
-    ] = None
-    camera: Annotated[
-        str | None, Parameter("Which camera, for readers; none: as the file says.")
-    ] = None
+
+    def chosen_frames(self) -> slice | None:
+        """Return the frames to take."""
+        if self.frames is None:
+            return None
+        match = _FRAMES.fullmatch(self.frames)
+        if match is None or match[3] == "0":
+            raise ValueError(f"frames: {self.frames!r}, expected first:end such as 100:200")
+        return slice(*(int(number) if number else None for number in match.groups()))
+
+
+@dataclass(frozen=True)
+class MeasurementDescription(ImagePosition, RecordingSettings, Stated, CameraFile):
+    """A measurement from a camera file: contents, position, and conversion."""
+
     band: Annotated[
         BandText | None,
         Parameter(
@@ -147,32 +120,6 @@ class MeasurementDescription(Part):
             "wavelength_um,response); none: that of the calibration or the file.",
             allowed="none, 3.8-5.1 um, response.csv",
         ),
-    ] = None
-    pitch: Annotated[
-        float | None,
-        Parameter("Distance between pixels on the object; none: as the file says.", LENGTH),
-    ] = None
-    fill_factor: Annotated[
-        float | None,
-        Parameter(
-            "Portion of a pixel's square that takes light; none: not stated, 1 is assumed for an "
-            "edge.",
-            over=0.0,
-            most=1.0,
-        ),
-    ] = None
-    quarter_turns: Annotated[int, ImagePosition.parameter("quarter_turns")] = 0
-    mirror: Annotated[Mirror, ImagePosition.parameter("mirror")] = "none"
-    tip: Annotated[Pixels | None, ImagePosition.parameter("tip")] = None
-    integration_time: Annotated[
-        float | None, Parameter("Integration time; none: as the file says.", TIME)
-    ] = None
-    range: Annotated[
-        str | None, Parameter("Measuring range of the camera by its name; none: not stated.")
-    ] = None
-    saturation: Annotated[
-        float | None,
-        Parameter("Largest number in the file that is not saturated; none: as the file says."),
     ] = None
     lower_limit: Annotated[
         float | None,
@@ -204,29 +151,15 @@ class MeasurementDescription(Part):
         default_factory=FlatFieldSection
     )
 
-    def chosen_frames(self) -> slice | None:
-        """Return the frames to take."""
-        if self.frames is None:
-            return None
-        match = _FRAMES.fullmatch(self.frames)
-        if match is None or match[3] == "0":
-            raise ValueError(f"frames: {self.frames!r}, expected first:end such as 100:200")
-        return slice(*(int(number) if number else None for number in match.groups()))
-
     def position(self) -> ImagePosition:
         """Return the position of the image in the coordinates of the cut."""
-        return ImagePosition(self.quarter_turns, self.mirror, self.tip)
+        return made_from(ImagePosition, self)
 
     def applied_to(self, recording: Recording) -> Recording:
         """Override a recording by this description."""
         said: dict[str, Any] = {
-            "camera": self.camera,
+            **{name: getattr(self, name) for name in RecordingSettings.declared()},
             "band": None if self.band is None else band_of(self.band),
-            "pitch": self.pitch,
-            "fill_factor": self.fill_factor,
-            "integration_time": self.integration_time,
-            "range_name": self.range,
-            "saturation": self.saturation,
             "object_parameters": self.object_parameters.applied_to(recording.object_parameters),
         }
         said = {name: value for name, value in said.items() if value is not None}

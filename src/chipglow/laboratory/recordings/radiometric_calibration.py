@@ -173,7 +173,7 @@ def _check_same(recording: Recording, calibration: Calibration) -> None:
     ours, theirs = recording.integration_time, calibration.integration_time
     if ours is not None and theirs is not None and abs(ours - theirs) > _SAME * theirs:
         apart.append((f"an integration time of {1e6 * theirs:g} us", f"{1e6 * ours:g} us"))
-    ranges = calibration.range_name, recording.range_name
+    ranges = calibration.range, recording.range
     if None not in ranges and ranges[0] != ranges[1]:
         apart.append((f"the range {ranges[0]!r}", repr(ranges[1])))
     band = recording.band
@@ -271,7 +271,7 @@ def _attributes(
         "quantity": recording.quantity,
         "fill_factor": recording.fill_factor,
         "integration_time": time,
-        "range": recording.range_name or getattr(calibration, "range_name", None),
+        "range": recording.range or getattr(calibration, "range", None),
         "calibration": calibration.description if calibration else None,
         "object_parameters": _object_text(recording),
         **_notes(recording, calibration, position, is_read).attrs(),
@@ -303,7 +303,7 @@ def _notes(
     position: ImagePosition,
     is_read: NDArray[np.bool_],
 ) -> Notes:
-    quantity, name = recording.quantity, getattr(calibration, "range_name", None)
+    quantity, name = recording.quantity, getattr(calibration, "range", None)
     time = getattr(calibration, "integration_time", None)
     assumed = {
         "The temperatures are radiance temperatures, as with an emissivity of 1: the file says "
@@ -315,7 +315,7 @@ def _notes(
             recording.integration_time is None and time is not None
         ),
         f"The range is the calibration's, {name}: the file does not state it.": (
-            recording.range_name is None and name is not None
+            recording.range is None and name is not None
         ),
         "No pixel is saturated: neither the file nor the description states the limit.": (
             recording.saturation is None

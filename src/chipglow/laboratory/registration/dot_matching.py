@@ -10,18 +10,43 @@ from scipy.spatial import KDTree
 
 from chipglow.quantities import Array
 
-_BASES: Final = 4
-_NEAREST: Final = 3
-_NEIGHBOURS: Final = 8
-_SCALES: Final = (0.5, 2.0)
-_TURN: Final = np.pi / 6
-_NEAR: Final = 0.3
-_ROUNDS: Final = 6
-_DISTINCT: Final = 16
-_TRIED: Final = 400
-_FEWEST: Final = 6
-_PRICE: Final = 3
-_CONTRADICTED: Final = 2
+_START_DOTS: Final = 4
+"""Infrared dots, those in the middle, from which pairs of neighbours are formed."""
+
+_START_NEIGHBOURS: Final = 3
+"""Neighbours of each of them that form a pair with it."""
+
+_VISIBLE_NEIGHBOURS: Final = 8
+"""Neighbours of a visible dot that may be the other dot of a pair: those around a dot of a square
+grid."""
+
+_WIDTH_RATIOS: Final = (0.5, 2.0)
+"""Smallest and largest width of the visible picture over that of the infrared image."""
+
+_MAX_TURN: Final = np.pi / 6
+"""Largest turn between the images in rad: a square grid matches itself after 90 degrees."""
+
+_MATCH_DISTANCE: Final = 0.3
+"""Distance of matching dots in spacings of the dots; beyond a half the next dot would be nearer."""
+
+_MAX_REFITS: Final = 6
+"""Most fits of an affine map to the matches of the map before."""
+
+_MAX_PLACEMENTS: Final = 16
+"""Distinct placements, the best ones, that are refined."""
+
+_MAX_HYPOTHESES: Final = 400
+"""Similarities, the best ones, that are compared."""
+
+_FEWEST_MATCHES: Final = 6
+"""Fewest dots that match: twice those that an affine map needs."""
+
+_CONTRADICTION_COST: Final = 3
+"""Matches that a contradiction outweighs: on a grid, a placement that is off by a column loses few
+matches and gains contradictions."""
+
+_CONTRADICTIONS_APART: Final = 2
+"""Contradictions more than the best placement's from which another one is excluded."""
 
 
 @dataclass(frozen=True)
@@ -55,10 +80,10 @@ def match_dots(
     for matrix in _hypotheses(first.pixels, second.pixels, nominal, tree, spacing):
         if all(_distance(matrix, other, first.pixels) > spacing / 2 for other in starts):
             starts.append(matrix)
-    fits = [_fitted(start, first, second, tree, spacing) for start in starts[:_DISTINCT]]
+    fits = [_fitted(start, first, second, tree, spacing) for start in starts[:_MAX_PLACEMENTS]]
     judged = [fit for fit in fits if fit is not None]
     best = max(judged, key=_Placement.worth, default=None)
-    if best is None or best.count < max(_FEWEST, best.contradictions):
+    if best is None or best.count < max(_FEWEST_MATCHES, best.contradictions):
         raise ValueError(
             f"dots: {0 if best is None else best.count} of {len(first.pixels)} in the infrared "
             f"image and {len(second.pixels)} in the visible picture match; both must show the "
@@ -80,7 +105,7 @@ class _Placement:
         return int(self.pairs.shape[1])
 
     def worth(self) -> int:
-        return self.count - _PRICE * self.contradictions
+        return self.count - _CONTRADICTION_COST * self.contradictions
 
 
 def _rivals(
@@ -92,7 +117,7 @@ def _rivals(
         for other in judged
         if _distance(other.matrix, best.matrix, first) > spacing / 2
         and 2 * other.count >= best.count
-        and other.contradictions < best.contradictions + _CONTRADICTED
+        and other.contradictions < best.contradictions + _CONTRADICTIONS_APART
     ]
     if others:
         away = _distance(max(others, key=_Placement.worth).matrix, best.matrix, first)
@@ -106,27 +131,29 @@ def _hypotheses(
     first: Array, second: Array, nominal: float, tree: KDTree, spacing: float
 ) -> list[Array]:
     """Return similarities (2, 3) that put a pair of neighbours on another, the best first."""
-    middle = np.argsort(np.hypot(*(first - np.median(first, axis=0)).T))[:_BASES]
-    near = KDTree(first).query(first[middle], min(_NEAREST + 1, len(first)))[1][:, 1:]
+    middle = np.argsort(np.hypot(*(first - np.median(first, axis=0)).T))[:_START_DOTS]
+    near = KDTree(first).query(first[middle], min(_START_NEIGHBOURS + 1, len(first)))[1][:, 1:]
     a = np.repeat(middle, near.shape[1])
     b = near.ravel()
-    around = tree.query(second, min(_NEIGHBOURS + 1, len(second)))[1][:, 1:]
+    around = tree.query(second, min(_VISIBLE_NEIGHBOURS + 1, len(second)))[1][:, 1:]
     c = np.repeat(np.arange(len(second)), around.shape[1])
     d = around.ravel()
     z, w = first @ [1, 1j], second @ [1, 1j]
     ratio = ((w[d] - w[c]) / (z[b] - z[a])[:, None]).ravel()
     shift = (w[c] - ratio.reshape(len(a), -1) * z[a][:, None]).ravel()
-    likely = np.abs(np.angle(ratio)) < _TURN
-    likely &= (np.abs(ratio) > _SCALES[0] * nominal) & (np.abs(ratio) < _SCALES[1] * nominal)
+    likely = np.abs(np.angle(ratio)) < _MAX_TURN
+    likely &= (np.abs(ratio) > _WIDTH_RATIOS[0] * nominal) & (
+        np.abs(ratio) < _WIDTH_RATIOS[1] * nominal
+    )
     found = []
     for turned, moved in zip(ratio[likely], shift[likely], strict=True):
         placed = turned * z + moved
         distance, which = tree.query(np.stack([placed.real, placed.imag], axis=1))
-        count = np.unique(which[distance < _NEAR * spacing]).size
+        count = np.unique(which[distance < _MATCH_DISTANCE * spacing]).size
         linear = np.array([[turned.real, -turned.imag], [turned.imag, turned.real]])
         found.append((count, np.column_stack([linear, [moved.real, moved.imag]])))
     found.sort(key=lambda entry: entry[0], reverse=True)
-    return [matrix for _, matrix in found[:_TRIED]]
+    return [matrix for _, matrix in found[:_MAX_HYPOTHESES]]
 
 
 def _fitted(
@@ -135,8 +162,8 @@ def _fitted(
     """Return the affine map of the matches near a placement; None if they are too few."""
     whole = np.column_stack([first.pixels, np.ones(len(first.pixels))])
     pairs = _pairs(whole @ matrix.T, tree, spacing)
-    for _ in range(_ROUNDS):
-        if pairs.shape[1] < _FEWEST:
+    for _ in range(_MAX_REFITS):
+        if pairs.shape[1] < _FEWEST_MATCHES:
             return None
         matrix = np.linalg.lstsq(whole[pairs[0]], tree.data[pairs[1]])[0].T
         before, pairs = pairs, _pairs(whole @ matrix.T, tree, spacing)
@@ -152,7 +179,7 @@ def _pairs(placed: Array, tree: KDTree, spacing: float) -> NDArray[np.int64]:
     """Return dots that are each other's nearest and near, shape (2, n)."""
     distance, which = tree.query(placed)
     back = KDTree(placed).query(tree.data)[1]
-    mutual = (distance < _NEAR * spacing) & (back[which] == np.arange(len(placed)))
+    mutual = (distance < _MATCH_DISTANCE * spacing) & (back[which] == np.arange(len(placed)))
     return np.stack([np.flatnonzero(mutual), which[mutual]])
 
 

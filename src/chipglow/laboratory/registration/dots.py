@@ -17,25 +17,69 @@ from chipglow.scene import Raster
 from chipglow.text import Notes
 
 FEWEST_DOTS: Final = 6
+"""Fewest dots of a target: twice those that an affine map needs."""
 
-_LEAST_SIZE: Final = 1.0
-_GREATEST_SIZE: Final = 1 / 12
-_NEXT_SIZE: Final = 1.25
-_MOST: Final = 600
-_ROUND: Final = 0.7
-_ALIKE_SIZE: Final = 1.6
-_ALIKE_STRENGTH: Final = 2.5
-_WINDOW: Final = 2.5
-_LEAST_WINDOW: Final = 3.0
+_SMALLEST_SCALE: Final = 1.0
+"""Smallest standard deviation in pixels of the Laplacian of Gaussian that finds dots. A disc gives
+its strongest response at its radius over √2: dots of 1.4 pixels."""
+
+_LARGEST_SCALE: Final = 1 / 12
+"""Largest such standard deviation as a fraction of the image's shorter side: dots of a quarter of
+it across."""
+
+_SCALE_RATIO: Final = 1.25
+"""Ratio of successive standard deviations, less than the ratio of sizes that count as alike."""
+
+_MAX_EXTREMA: Final = 600
+"""Number of the strongest extrema that are examined; limits the time for noisy images."""
+
+_MIN_ROUNDNESS: Final = 0.7
+"""Smallest roundness of a dot: 1 for a circle, 0 for an edge; 0.7 where the curvatures are 1 to
+3.4."""
+
+_SIZE_RATIO: Final = 1.6
+"""Largest ratio of the sizes of a target's dots, which differ by perspective alone."""
+
+_STRENGTH_RATIO: Final = 2.5
+"""Largest ratio of the strengths of a target's dots, for uneven heat or light."""
+
+_WINDOW_SCALES: Final = 2.5
+"""Radius of the window in which a disc is fitted, in standard deviations of its extremum: 1.8 radii
+of the disc."""
+
+_MIN_WINDOW: Final = 3.0
+"""Smallest radius of the window in pixels: 29 pixels for the 8 parameters of a disc."""
+
 _FEWEST_PIXELS: Final = 16
-_WORST: Final = 0.2
-_SCATTER: Final = 3.0
-_SYSTEMATIC: Final = 0.02
-_ROOM: Final = 2.0
-_AGAIN: Final = 12
-_SETTLED: Final = 0.2
-_ENOUGH: Final = 1e-6
-_ALIKE_PIXELS: Final = 8
+"""Fewest known pixels in the window of a disc: two for each of its 8 parameters."""
+
+_MAX_UNCERTAINTY: Final = 0.2
+"""Largest standard uncertainty of a middle, in standard deviations of its extremum; otherwise it is
+not taken for a disc."""
+
+_MAX_SCATTER: Final = 3.0
+"""Scatter of the dots over what their uncertainty explains, from which the map is doubted."""
+
+_COMMON_ERROR: Final = 0.02
+"""Standard uncertainty in infrared pixels of the error that all dots have in common; see
+`fit_dots`."""
+
+_BORDER_RADII: Final = 2.0
+"""Distance from the image's border, in radii of the dots, at which a dot is surely found: its
+window, of 1.8 radii, is within the image."""
+
+_MAX_REFITS: Final = 12
+"""Most repetitions of the fits without the neighbours' brightness."""
+
+_SETTLED_MOVE: Final = 0.2
+"""Move of a middle, in its standard uncertainties, below which the fits are not repeated."""
+
+_FIT_TOLERANCE: Final = 1e-6
+"""Relative change of the sum of squares at which a fit of a disc ends."""
+
+_CORRELATION_LENGTH: Final = 8
+"""Distance in pixels from which residuals count as independent of each other."""
+
 _NOT_MIRRORED: Final = (
     "The visible picture is not mirrored, is turned by up to 30 degrees, and shows half to twice "
     "the infrared image's width; otherwise give points."
@@ -104,8 +148,8 @@ def fit_dots(
     """
     dots = find_dots(infrared, "infrared image"), find_dots(visible, "visible picture")
     (first, second), warnings = match_dots(
-        Arrangement(dots[0].pixels, infrared.shape, _ROOM * dots[0].radius),
-        Arrangement(dots[1].pixels, visible.shape, _ROOM * dots[1].radius),
+        Arrangement(dots[0].pixels, infrared.shape, _BORDER_RADII * dots[0].radius),
+        Arrangement(dots[1].pixels, visible.shape, _BORDER_RADII * dots[1].radius),
     )
     columns, rows = dots[0].pixels[first].T
     positions = np.stack(
@@ -115,7 +159,7 @@ def fit_dots(
     scale = raster.spacing * np.sqrt(abs(np.linalg.det(fit.registration.jacobian(positions))))
     variance = (scale * dots[0].uncertainty[first]) ** 2
     expected = float(np.sqrt((variance + dots[1].uncertainty[second] ** 2).mean()))
-    if fit.scatter >= _SCATTER * expected:
+    if fit.scatter >= _MAX_SCATTER * expected:
         warnings += (
             f"The dots scatter by {fit.scatter:.2g} visible pixels where their own uncertainty "
             f"explains {expected:.2g}: the map is of another kind than the model.",
@@ -137,8 +181,8 @@ def find_dots(image: NDArray[np.generic], name: str = "image") -> Dots:
     if not known.any() or not np.ptp(values[known]) > 0:
         raise ValueError(f"{name}: has no contrast, expected a target with dots")
     filled = np.where(known, values, np.median(values[known]))
-    count = int(np.log(min(filled.shape) * _GREATEST_SIZE / _LEAST_SIZE) / np.log(_NEXT_SIZE))
-    sizes = np.asarray(_LEAST_SIZE * _NEXT_SIZE ** np.arange(max(count, 1) + 1))
+    count = int(np.log(min(filled.shape) * _LARGEST_SCALE / _SMALLEST_SCALE) / np.log(_SCALE_RATIO))
+    sizes = np.asarray(_SMALLEST_SCALE * _SCALE_RATIO ** np.arange(max(count, 1) + 1))
     strength = np.stack([size**2 * gaussian_laplace(filled, size) for size in sizes])
     groups = [_alike(_blobs(filled, sizes, sign * strength)) for sign in (-1.0, 1.0)]
     bright = _weight(groups[0]) >= _weight(groups[1])
@@ -159,10 +203,12 @@ def _blobs(image: Array, sizes: Array, strength: Array) -> Array:
     room = np.minimum.reduce(
         [column, row, image.shape[1] - 1 - column, image.shape[0] - 1 - row], axis=0
     )
-    strongest = np.flatnonzero((room > _WINDOW * size) & (level > 0) & (level < len(sizes) - 1))
-    strongest = strongest[np.argsort(found[strongest])[::-1][:_MOST]]
+    strongest = np.flatnonzero(
+        (room > _WINDOW_SCALES * size) & (level > 0) & (level < len(sizes) - 1)
+    )
+    strongest = strongest[np.argsort(found[strongest])[::-1][:_MAX_EXTREMA]]
     blobs = np.stack([column, row, size, found], axis=1)[strongest]
-    return _apart(blobs[_roundness(image, blobs) > _ROUND])
+    return _apart(blobs[_roundness(image, blobs) > _MIN_ROUNDNESS])
 
 
 def _apart(blobs: Array) -> Array:
@@ -196,8 +242,8 @@ def _alike(blobs: Array) -> Array:
     """Return the group of like size and strength with the largest weight."""
     best = blobs[:0]
     for size, strength in blobs[:, 2:].tolist():
-        alike = np.abs(np.log(blobs[:, 2] / size)) < np.log(_ALIKE_SIZE)
-        alike &= np.abs(np.log(blobs[:, 3] / strength)) < np.log(_ALIKE_STRENGTH)
+        alike = np.abs(np.log(blobs[:, 2] / size)) < np.log(_SIZE_RATIO)
+        alike &= np.abs(np.log(blobs[:, 3] / strength)) < np.log(_STRENGTH_RATIO)
         if alike.sum() >= FEWEST_DOTS and _weight(blobs[alike]) > _weight(best):
             best = blobs[alike]
     return best
@@ -225,10 +271,10 @@ class _Disc:
 def _discs(image: Array, known: NDArray[np.bool_], blobs: Array, bright: bool) -> list[_Disc]:
     """Return discs of like radius at blobs, fitted again without their neighbours' skirts."""
     discs = _like([_disc(image, known, blob) for blob in blobs[:, :3].tolist()], bright)
-    for _ in range(_AGAIN):
+    for _ in range(_MAX_REFITS):
         rest = image.copy()
         for disc in discs:
-            reach = disc.radius + 3 * disc.softness
+            reach = disc.radius + 3 * disc.softness  # erfc(3) = 2e-5 of the contrast is left
             part, columns, rows = _window(image.shape, disc.column, disc.row, reach)
             rest[part] -= disc.brightness(columns, rows)
         again = [_disc(rest, known, (d.column, d.row, d.size), d) for d in discs]
@@ -244,7 +290,7 @@ def _settled(before: list[_Disc], discs: list[_Disc]) -> bool:
         max(abs(new.column - old.column), abs(new.row - old.row)) / new.unsure
         for old, new in zip(before, discs, strict=False)
     ]
-    return len(before) == len(discs) and max(moves, default=0.0) < _SETTLED
+    return len(before) == len(discs) and max(moves, default=0.0) < _SETTLED_MOVE
 
 
 def _window(
@@ -263,7 +309,7 @@ def _like(found: list[_Disc | None], bright: bool) -> list[_Disc]:
     """Return the discs whose radius is like the others' and whose contrast has the right sign."""
     discs = [disc for disc in found if disc is not None and (disc.contrast > 0) == bright]
     likely = float(np.median([disc.radius for disc in discs])) if discs else 0.0
-    return [d for d in discs if likely / _ALIKE_SIZE < d.radius < _ALIKE_SIZE * likely]
+    return [d for d in discs if likely / _SIZE_RATIO < d.radius < _SIZE_RATIO * likely]
 
 
 def _disc(
@@ -271,7 +317,7 @@ def _disc(
 ) -> _Disc | None:
     """Fit the disc near a blob; its own brightness, if given, was taken from the image."""
     column, row, size = blob
-    reach = max(_WINDOW * size, _LEAST_WINDOW)
+    reach = max(_WINDOW_SCALES * size, _MIN_WINDOW)
     part, columns, rows = _window(image.shape, column, row, reach)
     used = (np.hypot(columns - column, rows - row) <= reach) & known[part]
     values = image[part] if own is None else image[part] + own.brightness(columns, rows)
@@ -289,18 +335,20 @@ def _disc(
 
     ground = float(target[~middle].mean())
     contrast = float(target[middle].mean()) - ground
+    # A disc gives its extremum at a radius of √2 sizes; its softness starts at half of this.
     begin = [0.0, 0.0, 1.4 * size, 0.7 * size, contrast, ground, 0.0, 0.0]
     if own is not None:
         begin[2:5] = own.radius, own.softness, own.contrast / scale
+    # Brightness is in units of its range in the window, so a contrast of 20 is no disc.
     upper = [reach / 2, reach / 2, 2 * reach, 2 * reach, 20.0, np.inf, 1 / reach, 1 / reach]
     lower = [-b for b in upper]
-    lower[2] = lower[3] = 0.05 * size
+    lower[2] = lower[3] = 0.05 * size  # a radius and a softness over 0
     begin = np.clip(begin, lower, upper).tolist()
-    fit = least_squares(residual, begin, bounds=(lower, upper), x_scale="jac", ftol=_ENOUGH)
+    fit = least_squares(residual, begin, bounds=(lower, upper), x_scale="jac", ftol=_FIT_TOLERANCE)
     variance = float(fit.fun @ fit.fun) / (target.size - len(begin))
     spread = np.linalg.pinv(fit.jac.T @ fit.jac)[:2, :2]
     unsure = float(np.sqrt(variance * np.trace(spread) / 2))
-    if not 0 < unsure < _WORST * size:
+    if not 0 < unsure < _MAX_UNCERTAINTY * size:
         return None
     rest = np.zeros(used.shape)
     rest[used] = fit.fun
@@ -310,7 +358,7 @@ def _disc(
 
 def _correlation(discs: list[_Disc]) -> float:
     """Return the factor on the uncertainty by correlated residuals (Newey and West)."""
-    weights = np.bartlett(2 * _ALIKE_PIXELS + 1)
+    weights = np.bartlett(2 * _CORRELATION_LENGTH + 1)
     kernel = np.outer(weights, weights)
     sums = sum(
         float((d.residual * convolve(d.residual, kernel, mode="constant")).sum()) for d in discs
@@ -323,7 +371,7 @@ def _systematic(found: Registration, raster: Raster) -> Array:
     """Return the covariance of shift, turn and scale that all dots have wrong in common."""
     left, right, bottom, top = raster.extent
     middle = np.array([(left + right) / 2, (bottom + top) / 2])
-    pixels = _SYSTEMATIC * raster.spacing * np.sqrt(abs(np.linalg.det(found.jacobian(middle))))
+    pixels = _COMMON_ERROR * raster.spacing * np.sqrt(abs(np.linalg.det(found.jacobian(middle))))
     elements = np.eye(3)
     elements[:2] /= np.hypot(right - left, top - bottom) / 2
     elements[2, :2] = -elements[[0, 1], [0, 1]] * middle

@@ -26,12 +26,18 @@ _TRANSPOSED: Final = (5, 6, 7, 8)
 PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".gif")
 
 _MOST_PIXELS: Final = 400_000_000
-_TURN: Final = 600
+"""Most pixels of all pages of a picture: 1.6 GB as float32."""
+
+_BLINK_DURATION: Final = 600
+"""Time in ms for which each picture is shown."""
 
 _VISIBLE: Final = (Column("visible_column"), Column("visible_row"))
 _BY_LENGTH: Final = (Column("x", "um", "m"), Column("y", "um", "m"), *_VISIBLE)
 _BY_PIXEL: Final = (Column("infrared_column"), Column("infrared_row"), *_VISIBLE)
-_HALF: Final = 0.5
+
+_HALF_PIXEL: Final = 0.5
+"""Coordinates count from the middle of the first pixel."""
+
 _HEAD: Final = """\
 # Map from the infrared image onto the visible picture, by chipglow register.
 # (X, Y, W) = matrix (x, y, 1) with x, y in m; column = X / W, row = Y / W, which count from 0 in
@@ -104,7 +110,7 @@ def read_pictures(path: str | Path, interval: float | None = None) -> Recording:
     if path.suffix.lower() in PICTURE_SUFFIXES:
         frames = _frames(path)
         times = np.arange(len(frames), dtype=np.float64) * (1.0 if interval is None else interval)
-        return Recording(frames, "counts", times, f"picture {path.name}")
+        return Recording(frames, "counts", times, camera=f"picture {path.name}")
     if camera_formats()[find_format(path)].states_quantity:
         return read_recording(path, interval=interval)
     return read_recording(path, quantity="counts", unit="counts", interval=interval)
@@ -145,7 +151,9 @@ def write_blink(pictures: tuple[NDArray[np.uint8], ...], path: str | Path) -> No
     """Write pictures that are shown in turns, again and again, as a GIF."""
     first, *others = (Image.fromarray(picture).quantize(255) for picture in pictures)
     with atomic_path(path) as temporary:
-        first.save(temporary, "GIF", save_all=True, append_images=others, duration=_TURN, loop=0)
+        first.save(
+            temporary, "GIF", save_all=True, append_images=others, duration=_BLINK_DURATION, loop=0
+        )
 
 
 def read_points(
@@ -160,7 +168,7 @@ def read_points(
     if by_pixel:
         places = np.stack([table["infrared_column"], table["infrared_row"]], axis=1)
         corner = np.array([raster.left, raster.top])
-        positions = corner + (places + _HALF) * raster.spacing * [1.0, -1.0]
+        positions = corner + (places + _HALF_PIXEL) * raster.spacing * [1.0, -1.0]
     else:
         positions = np.stack([table["x"], table["y"]], axis=1)
     left, right, bottom, top = raster.extent
@@ -172,7 +180,10 @@ def read_points(
                 f"{1e6 * top:.6g} um, or columns 0 to {raster.columns - 1} and rows 0 to "
                 f"{raster.rows - 1}"
             )
-        if not (-_HALF <= column <= shape[1] - _HALF and -_HALF <= row <= shape[0] - _HALF):
+        if not (
+            -_HALF_PIXEL <= column <= shape[1] - _HALF_PIXEL
+            and -_HALF_PIXEL <= row <= shape[0] - _HALF_PIXEL
+        ):
             raise ValueError(
                 f"{path}, line {line}: {column:g}, {row:g} is outside the visible picture, "
                 f"expected columns 0 to {shape[1] - 1} and rows 0 to {shape[0] - 1}"

@@ -19,10 +19,19 @@ Model: TypeAlias = Literal["similarity", "affine", "homography"]
 Method: TypeAlias = Literal["points", "dots"]
 
 _PARAMETERS: Final = {"similarity": 4, "affine": 6, "homography": 8}
-_FLATTEST: Final = 0.01
+"""Free parameters of each model."""
+
+_MIN_WIDTH_RATIO: Final = 0.01
+"""Smallest width over length of points that do not count as on a line."""
+
 _WORST_CONDITION: Final = 1e6
-_UNLIKELY: Final = 0.01
-_EXACT: Final = 1e-9
+"""Largest condition number at which points determine the model."""
+
+_MISPLACED_LEVEL: Final = 0.01
+"""Significance level of the test for misplaced points, over all points."""
+
+_EXACT_FIT: Final = 1e-9
+"""Scatter in the normalised coordinates below which residuals are rounding errors."""
 
 _BEST_PICKED: Final = 0.02
 """Scatter in visible pixels under which points are not picked: that of dots' middles."""
@@ -300,7 +309,7 @@ def _checked(positions: ArrayLike, pixels: ArrayLike, model: Model) -> tuple[Arr
         )
     for name, points in (("infrared image", given), ("visible picture", seen)):
         _, lengths, _ = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
-        if not lengths[1] > _FLATTEST * lengths[0]:
+        if not lengths[1] > _MIN_WIDTH_RATIO * lengths[0]:
             raise ValueError(
                 f"points: in the {name} they lie on a line, expected points spread in both "
                 "directions"
@@ -316,12 +325,12 @@ def _misplaced(residual: Array, hat: Array, variance: float, freedom: int) -> ND
     """Do the F test of every point against the scatter of the others, 1 % over all points."""
     count = residual.size // 2
     misplaced = np.zeros(count, np.bool_)
-    for i in range(count if freedom > 2 and variance > _EXACT**2 else 0):
+    for i in range(count if freedom > 2 and variance > _EXACT_FIT**2 else 0):
         part = slice(2 * i, 2 * i + 2)
         own = float(residual[part] @ np.linalg.solve(np.eye(2) - hat[part, part], residual[part]))
         others = max(variance * freedom - own, 0.0) / (freedom - 2)
         ratio = own / 2 / others if others > 0 else np.inf
-        misplaced[i] = fdtrc(2, freedom - 2, ratio) < _UNLIKELY / count
+        misplaced[i] = fdtrc(2, freedom - 2, ratio) < _MISPLACED_LEVEL / count
     return misplaced
 
 

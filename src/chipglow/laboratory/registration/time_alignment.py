@@ -18,13 +18,28 @@ from chipglow.laboratory.registration.registration import Registration
 from chipglow.quantities import Array, Brief
 from chipglow.text import Notes
 
-_FEWEST: Final = 6
+_FEWEST_FRAMES: Final = 6
+"""Fewest frames that two signals share: twice the fitted level, slope and offset."""
+
 _LEAST_OVERLAP: Final = 0.5
-_RIVAL: Final = 9.0
-_CHANCE: Final = 0.01
+"""Smallest fraction of the infrared frames for which there are visible ones."""
+
+_RIVAL_GAIN: Final = 9.0
+"""Twice the logarithm of the likelihood ratio below which another offset is nearly as likely: three
+standard deviations."""
+
+_CHANCE_LEVEL: Final = 0.01
+"""Probability of such a correlation at one of the offsets, if the signals are unrelated, from which
+it is a warning."""
+
 _MOST_OFFSETS: Final = 2_000_000
-_AT_ONCE: Final = 200_000
-_PENALTIES: Final = (-6.0, 9.0)
+"""Most offsets that are tried; limits memory and time."""
+
+_VALUES_AT_ONCE: Final = 200_000
+"""Values that are computed at once: 1.6 MB."""
+
+_PENALTY_EXPONENTS: Final = (-6.0, 9.0)
+"""Powers of ten of the penalty: from no smoothing to that of all but the slowest changes."""
 
 
 @dataclass(frozen=True)
@@ -101,8 +116,8 @@ def simultaneous_frames(
 def _check(name: str, times: Array, values: Array) -> None:
     if times.ndim != 1 or times.shape != values.shape:
         raise ValueError(f"{name} signal: {values.size} values but {times.size} times")
-    if times.size < _FEWEST:
-        raise ValueError(f"{name} signal: {times.size} frames, expected {_FEWEST} or more")
+    if times.size < _FEWEST_FRAMES:
+        raise ValueError(f"{name} signal: {times.size} frames, expected {_FEWEST_FRAMES} or more")
     if not (np.isfinite(values).all() and (np.diff(times) > 0).all()):
         raise ValueError(f"{name} signal: expected finite values at ascending times")
     if not values.std() > 1e-9 * max(abs(values.mean()), 1e-300):
@@ -119,7 +134,7 @@ def _smoothed(signal: Array) -> Array:
         rest = float((((1 - kept) * parts) ** 2).sum())
         return rest / float((1 - kept).sum()) ** 2
 
-    best = minimize_scalar(loss, bounds=_PENALTIES, method="bounded").x
+    best = minimize_scalar(loss, bounds=_PENALTY_EXPONENTS, method="bounded").x
     return np.asarray(idct(parts / (1 + 10.0**best * rough), norm="ortho"))
 
 
@@ -137,7 +152,7 @@ def _correlations(
             f"{_MOST_OFFSETS // 3} visible frames and half of the infrared ones among them"
         )
     offsets = low + step * np.arange(count)
-    parts = np.array_split(offsets, max(offsets.size * times.size // _AT_ONCE, 1))
+    parts = np.array_split(offsets, max(offsets.size * times.size // _VALUES_AT_ONCE, 1))
     found = [_correlation(target, spline(times + part[:, None])) for part in parts]
     return offsets, np.concatenate(found)
 
@@ -150,7 +165,7 @@ def _correlation(target: Array, values: Array) -> Array:
     one = np.where(known, one - one.sum(axis=1, keepdims=True) / count, 0.0)
     other = np.where(known, other - other.sum(axis=1, keepdims=True) / count, 0.0)
     size = np.sqrt((one**2).sum(axis=1) * (other**2).sum(axis=1))
-    enough = count[:, 0] >= max(_FEWEST, _LEAST_OVERLAP * target.size)
+    enough = count[:, 0] >= max(_FEWEST_FRAMES, _LEAST_OVERLAP * target.size)
     product = (one * other).sum(axis=1)
     return np.where(enough & (size > 0), product / np.maximum(size, 1e-300), 0.0)
 
@@ -178,7 +193,7 @@ def _chance(correlation: float, freedom: float, offsets: int) -> Iterator[str]:
     """Yield a warning if one of the offsets would have this correlation by chance."""
     rest = max(1.0 - correlation**2, 1e-15)
     likely = 2 * float(stdtr(freedom, -abs(correlation) * np.sqrt(freedom / rest))) * offsets
-    if likely >= _CHANCE:
+    if likely >= _CHANCE_LEVEL:
         yield f"A correlation of {correlation:.2f} is no better than that of unrelated signals."
 
 
@@ -192,7 +207,7 @@ def _rivals(offsets: Array, correlations: Array, best: int, count: int) -> Itera
     others[(left[-1] if left.size else 0) : (best + right[0] if right.size else None)] = 0.0
     rival = int(others.argmax())
     gain = count * log((1 - others[rival] + 1e-12) / (1 - squares[best] + 1e-12))
-    if gain <= _RIVAL and others[rival] > 0.0:
+    if gain <= _RIVAL_GAIN and others[rival] > 0.0:
         yield (
             f"An offset of {(offsets[rival] - offsets[best]) * 1e6:.4g} us more fits nearly as "
             f"well, with a correlation of {correlations[rival]:.2f}: they are periodic, or say "

@@ -23,6 +23,7 @@ from chipglow.io.sources.grids.layout import (
     AXES,
     COORDINATES,
     ROW_0,
+    ArrayNumbers,
     ascends,
     axes_of,
     coordinate,
@@ -46,7 +47,7 @@ from chipglow.io.sources.source import (
     extent_of,
     span_of,
 )
-from chipglow.quantities import FileBeside, Parameter, Part
+from chipglow.quantities import FileBeside, Parameter
 from chipglow.quantities.units import LENGTH, POSITION, SI, Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.regrid import regrid, taps
@@ -58,7 +59,7 @@ _LARGEST_BLOCK: Final = 64_000_000
 
 
 @dataclass(frozen=True)
-class GridSource(Source, Part):
+class GridSource(ArrayNumbers, Source):
     """Fields on a regular grid over time.
 
     ``names`` maps names in a scene to names in the file; also of ``material``
@@ -77,13 +78,6 @@ class GridSource(Source, Part):
         ),
     ] = None
     names: Mapping[str, str] = field(default_factory=dict)
-    axes: Annotated[
-        tuple[str, ...] | None,
-        Parameter(
-            "Order of the arrays' axes, without time for a single frame; none: as the file says, "
-            "or [time, y, x]."
-        ),
-    ] = None
     top_first: Annotated[
         bool, Parameter("Whether row 0 is the top one, without a coordinate y.")
     ] = True
@@ -97,19 +91,6 @@ class GridSource(Source, Part):
     ] = None
     left: Annotated[float, Parameter("Left edge of the grid, with spacing.", POSITION)] = 0.0
     top: Annotated[float, Parameter("Upper edge of the grid, with spacing.", POSITION)] = 0.0
-    void_value: Annotated[
-        float | None,
-        Parameter("Number that stands for no material, in the file's unit; NaN always does."),
-    ] = None
-    scale: Annotated[
-        float | None,
-        Parameter(
-            "Temperatures are scale x number + offset in their unit; none: 1.",
-            over=0.0,
-            allowed="none, 0.04",
-        ),
-    ] = None
-    offset: Annotated[float | None, Parameter("See scale; none: 0.", allowed="none, -40")] = None
     interval: float | None = None
     units: Units = field(default_factory=Units)
     placement: Placement = field(default_factory=Placement)
@@ -120,10 +101,6 @@ class GridSource(Source, Part):
         if unknown:
             raise ValueError(
                 f"files: unknown field {unknown[0]!r}, expected one of {', '.join(_KNOWN)}"
-            )
-        if self.axes is not None and sorted(self.axes) not in (sorted(AXES), ["x", "y"]):
-            raise ValueError(
-                f"axes: {self.axes!r}, expected time, y and x in any order, or y and x"
             )
         if self.placement.depth != 2:
             raise ValueError("placement: a grid has the axes x and y, expected no z")

@@ -1,8 +1,8 @@
 """Which array of a file is which field or coordinate, along which axes and in which unit."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from typing import Any, Final
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from chipglow.io.sources.grids.file_array import FileArray
 from chipglow.io.sources.grids.unpacking import PACKING, unpack
 from chipglow.io.sources.plausible import LARGEST_WITHOUT_UNIT
 from chipglow.io.sources.source import SourceError, naming
+from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import SI, Unit
 from chipglow.text import Notes
 
@@ -47,6 +48,38 @@ _BOTTOM_OR_RIGHT: Final = {"y": ("LL", "LR"), "x": ("UR", "LR")}
 _COLOURS: Final = ("IMAGE_INDEXED", "IMAGE_TRUECOLOR")
 _LARGEST_UNEVENNESS: Final = 0.05
 """Maximum distance of a coordinate from its even place, in steps."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArrayNumbers(Part):
+    """How the numbers of an array in a file are to be read."""
+
+    axes: Annotated[
+        tuple[str, ...] | None,
+        Parameter(
+            "Order of the array's axes, without time for a single frame; none: as the file says.",
+            allowed="none, or [time, y, x]",
+        ),
+    ] = None
+    void_value: Annotated[
+        float | None, Parameter("Number in the file that stands for no value; NaN always does.")
+    ] = None
+    scale: Annotated[
+        float | None,
+        Parameter(
+            "Temperature or radiance is scale x number + offset in its unit; none: 1.",
+            over=0.0,
+            allowed="none, 0.04",
+        ),
+    ] = None
+    offset: Annotated[float | None, Parameter("See scale; none: 0.", allowed="none, -40")] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.axes is not None and sorted(self.axes) not in (sorted(AXES), ["x", "y"]):
+            raise ValueError(
+                f"axes: {self.axes!r}, expected time, y and x in any order, or y and x"
+            )
 
 
 def find_fields(

@@ -1,0 +1,119 @@
+"""The corrected temperatures in the report: a sentence for each place, images and curves."""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from chipglow.analysis import CorrectedPlace, CorrectedWindow
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.quantities import Array
+from chipglow.report.facts import Facts
+from chipglow.report.page import texts
+from chipglow.report.rows import Row, slug
+from chipglow.scene.figures import ImagePanel, image_figure
+
+_LARGEST: Final = 98.0
+"""Percentile of the half-widths at which their scale ends: those near the range limit are wider."""
+
+
+def sentences(facts: Facts, rows: Mapping[str, Row]) -> Iterator[str]:
+    """Yield a sentence for each corrected place and for each corrected part of the image."""
+    windows = facts.analysis.cut.corrected if facts.analysis.cut else ()
+    words = texts()["correction"]
+    for window in windows:
+        for place in window.places:
+            cells = _cells(rows, slug(place.name), "degC")
+            reach = float(place.estimate.expanded_uncertainty())
+            yield facts.text(
+                words["place"],
+                place=place.name,
+                surface=place.surface,
+                pixels=int(place.pixels.sum()),
+                is_held=abs(float(place.estimate.values) - place.true) <= reach,
+                low=cells["corrected_low"],
+                high=cells["corrected_high"],
+                measured=cells["measured"],
+                corrected=cells["corrected"],
+                truth=cells["true"],
+            )
+    for window in windows:
+        cells = _cells(rows, slug(window.surface), "rms_K")
+        held = rows[f"{slug(window.surface)}_held_percent"].cells["mean"]
+        yield facts.text(words["window"], surface=window.surface, held=held, **cells)
+
+
+def _cells(rows: Mapping[str, Row], start: str, end: str) -> dict[str, str]:
+    """Return the texts of the numbers whose keys begin and end so, by what is between."""
+    return {
+        key.removeprefix(f"{start}_").removesuffix(f"_{end}"): row.cells["mean"]
+        for key, row in rows.items()
+        if key.startswith(f"{start}_") and key.endswith(f"_{end}")
+    }
+
+
+def images(facts: Facts) -> Figure | None:
+    """Draw the corrected part of the image as measured, corrected and true, and the half-width."""
+    windows = facts.cut.corrected
+    if not windows:
+        return None
+    figure = image_figure(windows[0].correction.raster, 1.6, rows=len(windows))
+    grid = figure.subplots(len(windows), 4, sharex=True, sharey=True, squeeze=False)
+    for row, window in zip(grid, windows, strict=True):
+        for axes, panel in zip(row, _panels(window), strict=True):
+            panel.draw(figure, axes, window.correction.raster, facts.analysis.tool, "bottom")
+            _mark(axes, window)
+            axes.label_outer()
+    return figure
+
+
+def _panels(window: CorrectedWindow) -> Iterator[ImagePanel]:
+    data = window.correction.data.isel(time=0)
+    corrected = data["temperature"].values - KELVIN
+    measured = window.measurement.celsius(0)
+    true = np.where(np.isnan(corrected), np.nan, window.true - KELVIN)
+    half = (data["upper"].values - data["lower"].values) / 2
+    heat = scales.ends(np.concatenate([measured, corrected, true]), 0.5, 99.5)
+    known = half[np.isfinite(half)]
+    widths = 0.0, float(np.percentile(known, _LARGEST)) if known.size else 1.0
+    for title, image in (("measured", measured), ("corrected", corrected), ("true", true)):
+        yield ImagePanel(f"{title}, {window.surface}", "°C", image, heat, scales.HEAT)
+    yield ImagePanel("half-width (95 %)", "K", half, widths)
+
+
+def _mark(axes: Axes, window: CorrectedWindow) -> None:
+    """Draw the centres of the pixels of the places."""
+    x, y = np.meshgrid(window.correction.raster.x, window.correction.raster.y)
+    for place in window.places:
+        at = 1e6 * x[place.pixels], 1e6 * y[place.pixels]
+        axes.plot(*at, ".", color=GREEN, markersize=2)
+
+
+def curves(facts: Facts) -> Figure | None:
+    """Draw measured, corrected and true temperature of the pixels along each place."""
+    every = [(window, place) for window in facts.cut.corrected for place in window.places]
+    if not every:
+        return None
+    figure = drawing.new_figure(3.2)
+    panels = figure.subplots(1, len(every), squeeze=False)[0]
+    for axes, (window, place) in zip(panels, every, strict=True):
+        data = window.correction.data.isel(time=0)
+        at, measured = 1e6 * place.distance, window.measurement.celsius(0)
+        corrected, lower, upper = (
+            data[name].values - KELVIN for name in ("temperature", "lower", "upper")
+        )
+        axes.fill_between(at, _along(place, lower), _along(place, upper), color=BLUE, alpha=0.2)
+        axes.plot(at, _along(place, window.true - KELVIN), color=GREY, label="true")
+        axes.plot(at, _along(place, corrected), color=BLUE, label="corrected, 95 % interval")
+        axes.plot(at, _along(place, measured), color=VERMILLION, label="measured")
+        axes.set(title=f"{place.name}, {place.surface}", xlabel="distance / µm")
+    panels[0].set_ylabel("temperature / °C")
+    drawing.legend(figure, 3, panels[:1])
+    return figure
+
+
+def _along(place: CorrectedPlace, image: Array) -> Array:
+    return np.asarray(image[place.pixels][place.order])
