@@ -256,7 +256,7 @@ def test_the_radiance_continues_beyond_the_image():
     size = (count + 2 * more) * SAMPLES
     samples = Raster(-more * PITCH, (count + more) * PITCH, PITCH / SAMPLES, size, size)
     kelvins = np.broadcast_to(900.0 + 15.0 * (samples.x / PITCH - count / 2), samples.shape)
-    formation = CAMERA.image_formation(samples, pixels=pixels)
+    formation = image_formation(CAMERA, samples, pixels=pixels)
     light = formation.forward(0.5 * BAND.radiance(kelvins))
     image = Measurement.from_radiance(light[None], BAND, np.zeros(1), pixels)
     result = correct(image, CAMERA, [Zone("plate", 0.5)], surroundings=DARK, noise=0.1)

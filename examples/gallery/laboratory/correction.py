@@ -28,7 +28,8 @@ import numpy as np
 import chipglow
 from chipglow.camera import image_formation
 from chipglow.drawing.drawing import legend, new_figure, style
-from chipglow.drawing.scales import BLUE, GREY, KELVIN, VERMILLION
+from chipglow.drawing.scales import BLUE, GREY, VERMILLION
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Polygon, Region
 
 PIXELS, PITCH, SAMPLES = 24, 6e-6, 8
@@ -74,11 +75,15 @@ with style():
     ):
         data = result.data.isel(time=0, y=row)
         assumed = np.where(data.zone == 1, TOOL, cases[title][0])
-        alone = band.temperature(radiance[row] / assumed) - KELVIN
-        axes.plot(1e6 * samples.x, kelvins[line] - KELVIN, color=GREY, label="true")
+        alone = band.temperature(radiance[row] / assumed) - ZERO_CELSIUS
+        axes.plot(1e6 * samples.x, kelvins[line] - ZERO_CELSIUS, color=GREY, label="true")
         axes.plot(along, alone, color=VERMILLION, label="emissivity alone")
-        axes.plot(along, data.temperature - KELVIN, color=BLUE, label="corrected, 95 % interval")
-        axes.fill_between(along, data.lower - KELVIN, data.upper - KELVIN, color=BLUE, alpha=0.25)
+        axes.plot(
+            along, data.temperature - ZERO_CELSIUS, color=BLUE, label="corrected, 95 % interval"
+        )
+        axes.fill_between(
+            along, data.lower - ZERO_CELSIUS, data.upper - ZERO_CELSIUS, color=BLUE, alpha=0.25
+        )
         axes.set(title=title, xlabel="x / µm")
         axes.label_outer()
     figure.axes[0].set_ylabel("temperature / °C")
