@@ -76,8 +76,7 @@ class PageView:
             self.session.restore(texts or {})
         except ValueError as error:
             self._refused = f"Link: {error}"
-        shown = opened.scene if isinstance(opened, SceneModel) else opened.measurement
-        self.figures = Figures(shown.raster, shown.tool, opened.images)
+        self.figures = Figures(opened.raster, opened.tool, opened.images)
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._show_opened = partial(self._send, "open")
@@ -257,7 +256,8 @@ class PageView:
         if picture.corrected is not None:
             raster = picture.corrected.correction.raster
             size = f"{raster.columns} × {raster.rows}"
-            return f"Corrected: {size} pixels around the cursor.", ""
+            around = "" if raster == picture.raster else " around the cursor"
+            return f"Corrected: {size} pixels{around}.", ""
         if picture.state.study.images == CORRECTION:
             return "Exact picture; the correction follows.", "busy"
         if shown in picture.absent:
