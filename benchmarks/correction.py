@@ -280,8 +280,8 @@ def main():
     print_widths(results)
     off = np.array([off for _, _, off, step in results if step >= CLEAR])
     if off.size:
-        print(f"\n{off.size} outlines with a step of the radiance of 10 % or more", end=": ")
-        print(f"{100 * (off < 0.05).mean():.0f} % found within 0.05 pixels", end="")
+        print(f"\noutline found within 0.05 pixels: {100 * (off < 0.05).mean():.0f} %", end="")
+        print(f" of {off.size} with a step of the radiance of 10 % or more", end="")
         print(f"; median {np.median(off):.3f} pixels, largest {off.max():.2f}")
 
 
