@@ -13,7 +13,7 @@ from math import radians
 
 import numpy as np
 from common import arguments
-from dual_spectrum import View
+from dual_spectrum import TwoCameraView
 from scipy.ndimage import gaussian_filter
 from scipy.stats import f as f_distribution
 
@@ -25,7 +25,7 @@ _FINER = 4
 
 
 @dataclass(frozen=True)
-class DotTarget(View):
+class DotTarget(TwoCameraView):
     """One view of the target; `gaps` are holes that are left out, by number."""
 
     columns: int = 8

@@ -25,7 +25,7 @@ TOOL = ToolGeometry()
 
 
 @dataclass(frozen=True)
-class View:
+class TwoCameraView:
     """How the visible camera sees what the infrared one does; what is random follows the seed.
 
     The place `middle` in m is in the middle of its picture but for the shift in pixels.
@@ -70,7 +70,7 @@ class View:
 
 
 @dataclass(frozen=True)
-class DualSpectrum(View):
+class DualSpectrum(TwoCameraView):
     """One experiment; the seed determines all random values."""
 
     noise: float = 0.005

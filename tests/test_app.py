@@ -18,10 +18,10 @@ from chipglow.app.controls import LINES, OWN, REFERENCES, TABLE
 from chipglow.app.files import chip_picture, measurement_file, study_file
 from chipglow.app.opening import open_any, open_uploaded, scene_model
 from chipglow.app.session import Newest, Session, SupersededError
-from chipglow.app.view import View as PageView
+from chipglow.app.view import PageView
 from chipglow.camera.reference import reference_temperature
-from chipglow.drawing.scales import KELVIN
 from chipglow.io import example_scene, is_measurement
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.quantities.format import readable
 from chipglow.scene import sample
 from chipglow.scene.lines import nearest
@@ -78,7 +78,7 @@ STATES = [
 
 @pytest.mark.parametrize("texts", STATES, ids=lambda texts: ", ".join(texts) or "first")
 def test_a_saved_study_gives_the_same_numbers(model, tmp_path, texts):
-    state = model.controls.changed(model.controls.initial, texts)
+    state = model.controls.state_with(model.controls.initial, texts)
     picture = model.picture(state)
     file = tmp_path / "study.yaml"
     file.write_bytes(study_file(model, state))
@@ -92,7 +92,9 @@ def test_a_saved_study_gives_the_same_numbers(model, tmp_path, texts):
     )
     line = LinePlace("line", study.analysis.lines["across the rake face"])
     points = line.line(picture.raster.spacing).points
-    measured = sample(expected.measured.values, camera.pixels(exposure.raster), points) - KELVIN
+    measured = (
+        sample(expected.measured.values, camera.pixels(exposure.raster), points) - ZERO_CELSIUS
+    )
     np.testing.assert_array_equal(picture.lines["rake_line"]["measured"], measured)
 
 
@@ -103,7 +105,7 @@ def test_the_numbers_are_those_of_the_pixel_and_the_sample(model):
         "cursor": "-40,200",
         "error_image": "psf",
     }
-    state = model.controls.changed(model.controls.initial, texts)
+    state = model.controls.state_with(model.controls.initial, texts)
     picture = model.picture(state)
     numbers = model.numbers(picture)
     camera, exposure, surface = seen_by_the_library(state.study, state.study.start)
@@ -130,7 +132,7 @@ def test_an_error_image_that_is_zero_everywhere_says_why(model):
     state, absent = model.controls.initial, []
     for texts in ({"error_image": "texture"}, {"error_image": "psf"}, {"surface": "uniform"},
                   {"error_image": "texture"}, {"camera.psf": "none"}):  # fmt: skip
-        state = model.controls.changed(state, texts)
+        state = model.controls.state_with(state, texts)
         for quick in (True, False):
             picture = model.picture(state, quick=quick)
             is_zero = not np.nan_to_num(picture.panels["error"].values).any()
@@ -171,7 +173,7 @@ def test_values_answer_the_message_that_caused_them_not_a_later_one(page_view):
 
 
 def test_the_error_of_the_true_temperature_has_emissivity_as_a_part_of_its_own(model):
-    state = model.controls.changed(
+    state = model.controls.state_with(
         model.controls.initial, {"analysis.reference": "true-maximum", "error_image": "emissivity"}
     )
     picture = model.picture(state)
@@ -199,7 +201,7 @@ def test_the_rake_face_is_marked_where_its_line_enters_the_tool(model):
 
 
 def test_a_limit_above_all_temperatures_says_so_and_leaves_the_scene_visible(opened, model):
-    state = model.controls.changed(model.controls.initial, {"camera.lower_limit": "5000"})
+    state = model.controls.state_with(model.controls.initial, {"camera.lower_limit": "5000"})
     picture = model.picture(state)
     assert picture.panels["scene"].limits[1] < 1000
     text, kind = PageView(opened)._described(picture)
@@ -210,7 +212,7 @@ def test_a_limit_above_all_temperatures_says_so_and_leaves_the_scene_visible(ope
 @pytest.mark.parametrize("reference", ["maximum", "true-maximum"])
 def test_parts_and_contributions_at_the_cursor_sum_to_the_same_error(model, page_view, reference):
     texts = {"cursor": "-40,200", "analysis.reference": reference}
-    state = model.controls.changed(model.controls.initial, texts)
+    state = model.controls.state_with(model.controls.initial, texts)
     picture = model.picture(state)
     found, numbers = model.contributions(picture, lambda: None), model.numbers(picture)
     camera, _, surface = seen_by_the_library(state.study, state.study.start)
@@ -234,7 +236,7 @@ def test_parts_and_contributions_at_the_cursor_sum_to_the_same_error(model, page
     ],
 )
 def test_contributions_that_are_not_computed_say_why(model, page_view, texts, reason):
-    picture = model.picture(model.controls.changed(model.controls.initial, texts))
+    picture = model.picture(model.controls.state_with(model.controls.initial, texts))
     assert model.contributions(picture, lambda: None) == {}
     view, sent = page_view
     view._show_numbers(picture, model.numbers(picture), {})
@@ -256,7 +258,7 @@ def test_the_error_at_the_cursor_is_measured_minus_the_reference_shown(
     label = REFERENCES[reference].lower()
     for cursor in ("-33.2,288.9", "-150,150"):
         texts = {"analysis.reference": reference, "camera.detector": noise, "cursor": cursor}
-        picture = model.picture(model.controls.changed(model.controls.initial, texts))
+        picture = model.picture(model.controls.state_with(model.controls.initial, texts))
         numbers = model.numbers(picture)
         view._show_numbers(picture, numbers, {})
         html = sent[-1]["content"]
@@ -274,18 +276,20 @@ def test_the_exposure_and_its_start_offer_what_the_scene_allows(model):
     controls, initial = model.controls, model.controls.initial
     assert controls.ranges(initial)["camera.integration_time"] == [1.0, 11.0]  # of 413 to 424 µs
     for start in controls.ranges(initial)["start"]:
-        at_start = controls.changed(initial, {"start": f"{start} us"})
+        at_start = controls.state_with(initial, {"start": f"{start} us"})
         _, longest = controls.ranges(at_start)["camera.integration_time"]
-        longer = controls.changed(at_start, {"camera.integration_time": f"{longest}"})
+        longer = controls.state_with(at_start, {"camera.integration_time": f"{longest}"})
         assert start in controls.ranges(longer)["start"]
         if longest < 50.0:  # five times the exposure that is shown first
             with pytest.raises(ValueError, match="is not within the scene"):
-                controls.changed(at_start, {"camera.integration_time": f"{longest + 0.5}"})
+                controls.state_with(at_start, {"camera.integration_time": f"{longest + 0.5}"})
 
 
 def test_a_newer_state_ends_the_picture_and_the_contributions(model):
     controls = model.controls
-    seen, next_one = (controls.changed(controls.initial, {"start": f"{n} us"}) for n in (401, 402))
+    seen, next_one = (
+        controls.state_with(controls.initial, {"start": f"{n} us"}) for n in (401, 402)
+    )
     picture = model.picture(seen)
 
     def check():
@@ -300,7 +304,7 @@ def test_a_newer_state_ends_the_picture_and_the_contributions(model):
 def test_the_uncertainty_is_shown_or_its_absence_explained(model, page_view):
     view, sent = page_view
     for texts, said in (({}, "No ± without noise"), ({"camera.detector": "noise"}, " ± 0.0")):
-        picture = model.picture(model.controls.changed(model.controls.initial, texts))
+        picture = model.picture(model.controls.state_with(model.controls.initial, texts))
         view._show_numbers(picture, model.numbers(picture), {})
         assert said in sent[-1]["content"]
 
@@ -320,7 +324,7 @@ def test_draws_are_those_of_other_pixels_and_textures(model):
     at_cursor = nearest(errors["case_1"].values, pixels, state.cursor)
     assert drawn.error.values[1, 1] == pytest.approx(at_cursor, abs=1e-9)
     points = state.line("band_line").line(pixels.spacing).points
-    measured = sample(errors["measured"].values, pixels, points) - KELVIN
+    measured = sample(errors["measured"].values, pixels, points) - ZERO_CELSIUS
     np.testing.assert_allclose(drawn.lines["band_line"][5], measured, rtol=1e-12)
 
 
@@ -333,7 +337,7 @@ def test_a_quick_look_is_the_same_scene_on_fewer_samples_and_no_finer_pixels(mod
     rows, columns = quick.raster.shape  # the coarse scene may have some pixels fewer
     change = quick.panels["measured"].values - exact.panels["measured"].values[:rows, :columns]
     assert np.nanmedian(np.abs(change)) < 3.0
-    fine = model.controls.changed(initial, {"camera.pitch": "1 um"})
+    fine = model.controls.state_with(initial, {"camera.pitch": "1 um"})
     assert model.is_ready(initial) and not model.is_ready(fine)
     assert model.picture(fine, quick=True).raster.spacing == coarse.raster.spacing > 1e-6
     assert model.picture(fine).raster.spacing == 1e-6 and model.is_ready(fine)
@@ -366,7 +370,7 @@ def test_a_quick_look_is_the_same_scene_on_fewer_samples_and_no_finer_pixels(mod
 )
 def test_a_refused_value_is_one_clear_error(model, texts, said):
     with pytest.raises(ValueError) as error:
-        model.controls.changed(model.controls.initial, texts)
+        model.controls.state_with(model.controls.initial, texts)
     assert said in str(error.value) and "\n" not in str(error.value)
 
 
@@ -383,18 +387,18 @@ def test_a_link_brings_the_state_back(model):
         "camera.lower_limit": "none",
         "band_line": "-310,90;-250,200",
     }
-    state = model.controls.changed(model.controls.initial, texts)
-    restored = model.controls.changed(model.controls.initial, state.texts)
+    state = model.controls.state_with(model.controls.initial, texts)
+    restored = model.controls.state_with(model.controls.initial, state.texts)
     assert restored == state and restored.study == state.study
     assert state.texts.keys() == texts.keys() and state.study.start == 395.5e-6
-    assert model.controls.changed(model.controls.initial, shown(model, state)) == state
+    assert model.controls.state_with(model.controls.initial, shown(model, state)) == state
     back = {path: shown(model, model.controls.initial)[path] for path in texts}
-    assert model.controls.changed(state, back).texts == {}
+    assert model.controls.state_with(state, back).texts == {}
 
 
 def test_a_decimal_comma_and_the_units_of_the_page_are_read(model):
     for text, pitch in (("5,5", 5.5e-6), ("5.5 µm", 5.5e-6), ("0,0055 mm", 5.5e-6)):
-        state = model.controls.changed(model.controls.initial, {"camera.pitch": text})
+        state = model.controls.state_with(model.controls.initial, {"camera.pitch": text})
         assert state.study.camera.pitch == pitch and state.texts == {"camera.pitch": "5.5 um"}
     assert readable("413 us to 503 us, 6 um, 300 degC") == "413 µs to 503 µs, 6 µm, 300 °C"
 
@@ -417,17 +421,17 @@ def test_the_study_has_the_setting_of_each_control(model):
 
 def test_a_setting_counts_again_when_the_study_has_it_again(model):
     texts = {"camera.psf.numerical_aperture": "0.2", "camera.psf": "gaussian"}
-    state = model.controls.changed(model.controls.initial, texts)
+    state = model.controls.state_with(model.controls.initial, texts)
     assert state.study.camera.psf.kind == "gaussian"
     values = model.controls.values(state)
     assert "camera.psf.fwhm" in values and "camera.psf.numerical_aperture" not in values
-    again = model.controls.changed(state, {"camera.psf": "annular-aperture"})
+    again = model.controls.state_with(state, {"camera.psf": "annular-aperture"})
     assert again.study.camera.psf.numerical_aperture == 0.2
 
 
 @pytest.mark.parametrize("reference", ["maximum", "true-mean"])
 def test_what_is_saved_can_be_opened(model, tmp_path, reference):
-    state = model.controls.changed(model.controls.initial, {"analysis.reference": reference})
+    state = model.controls.state_with(model.controls.initial, {"analysis.reference": reference})
     picture, label = model.picture(state), REFERENCES[reference].lower()
     file = tmp_path / "measurement.nc"
     file.write_bytes(measurement_file(picture, model))
@@ -448,7 +452,7 @@ def test_what_is_saved_can_be_opened(model, tmp_path, reference):
     np.testing.assert_allclose(seen.data["case_1"].values, stored, atol=1e-9)
     texts = {"cursor": "-33.2,288.9", **dict.fromkeys(LINES, "-90,281;20,296")}
     seen, shown = (
-        one.picture(one.controls.changed(one.controls.initial, {**texts, **more}))
+        one.picture(one.controls.state_with(one.controls.initial, {**texts, **more}))
         for one, more in ((again, {}), (model, {"analysis.reference": reference}))
     )
     for name in ("reference", "measured", "case_1"):
@@ -462,7 +466,7 @@ def test_what_is_saved_can_be_opened(model, tmp_path, reference):
 @pytest.mark.parametrize("texts", STATES, ids=lambda texts: ", ".join(texts) or "first")
 def test_a_saved_study_opens_with_its_scene_exposure_images_and_places(model, tmp_path, texts):
     places = {"cursor": "-40,200", "band_line": "-310,90;-250,200", "error_image": "motion"}
-    state = model.controls.changed(model.controls.initial, texts | places)
+    state = model.controls.state_with(model.controls.initial, texts | places)
     file = tmp_path / "a7b8.nc"
     file.write_bytes(study_file(model, state))
     again = open_uploaded(file, "study.yaml", [model])

@@ -138,7 +138,7 @@ def turn(page, label, text):
 
 def expected(model, texts):
     """What the library measures at the cursor, as the page writes it."""
-    state = model.controls.changed(model.controls.initial, texts)
+    state = model.controls.state_with(model.controls.initial, texts)
     measured = model.numbers(model.picture(state))["measured"]
     return f"{measured - 273.15:.1f} °C"
 
@@ -262,7 +262,7 @@ def test_a_line_and_the_cursor_are_dragged(page, model):
     pixel = 660 / 290  # µm on the screen, about
     assert np.hypot(found[0] + 400, found[1] - 150) < 3 * pixel
     moved = {"band_line": ends.input_value()}
-    state = model.controls.changed(model.controls.initial, moved)
+    state = model.controls.state_with(model.controls.initial, moved)
     values = model.picture(state).lines["band_line"]["measured"]
     assert np.isfinite(values).all()
     # The numbers follow the line's place when they are computed.

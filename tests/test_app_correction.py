@@ -10,10 +10,11 @@ from chipglow.app.controls import CORRECTION_IMAGES
 from chipglow.app.files import study_file
 from chipglow.app.opening import open_any
 from chipglow.app.session import Session, SupersededError
+from chipglow.app.view import View
 from chipglow.camera import Measurement
-from chipglow.correction import correct, observed_scene, surroundings_of
-from chipglow.drawing.scales import KELVIN
+from chipglow.correction import correct, observed_scene, surroundings_of, write_correction
 from chipglow.io import example_scene
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.study import fit
 
 pytest.importorskip("panel", reason="needs the extra app")
@@ -38,7 +39,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def state(model):
-    return model.controls.changed(model.controls.initial, MODE)
+    return model.controls.state_with(model.controls.initial, MODE)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +74,7 @@ def test_the_corrected_pixels_are_those_of_the_library(picture, state):
     assert found.raster == expected.raster
     temperature = found.data["temperature"][0].values
     np.testing.assert_array_equal(temperature, expected.data["temperature"][0].values)
-    np.testing.assert_array_equal(picture.panels["measured"].values, temperature - KELVIN)
+    np.testing.assert_array_equal(picture.panels["measured"].values, temperature - ZERO_CELSIUS)
     pixel = picture.corrected.at(state.cursor)
     budget = expected.budget(state.cursor)
     assert pixel.contributions == dict(zip(budget.cause, budget.standard_uncertainty, strict=True))
@@ -88,12 +89,12 @@ def test_the_third_image_is_half_width_truth_or_error(model, picture, state):
     true = picture.corrected.true
     expected = {
         "half-width": (data["upper"].values - data["lower"].values) / 2,
-        "true": np.where(np.isnan(data["temperature"].values), np.nan, true) - KELVIN,
+        "true": np.where(np.isnan(data["temperature"].values), np.nan, true) - ZERO_CELSIUS,
         "error": data["temperature"].values - true,
     }
     assert set(expected) == set(CORRECTION_IMAGES)
     for name, values in expected.items():
-        chosen = model.controls.changed(state, {"correction_image": name})
+        chosen = model.controls.state_with(state, {"correction_image": name})
         np.testing.assert_array_equal(model.picture(chosen).panels["error"].values, values)
 
 
@@ -110,9 +111,9 @@ def test_the_lines_show_the_corrected_and_the_true_temperature(picture):
 
 def test_a_move_of_the_cursor_nearby_keeps_the_correction(model, picture, state):
     x, y = (1e6 * value for value in state.cursor)
-    near = model.controls.changed(state, {"cursor": f"{x + 1},{y}"})
+    near = model.controls.state_with(state, {"cursor": f"{x + 1},{y}"})
     assert model.picture(near).corrected is picture.corrected
-    far = model.controls.changed(state, {"cursor": f"{x},{y - 150}"})
+    far = model.controls.state_with(state, {"cursor": f"{x},{y - 150}"})
     shown = model.picture(far)
     assert shown.corrected is None
     assert np.isnan(shown.panels["measured"].values).all()
@@ -126,7 +127,7 @@ def test_only_controls_with_an_effect_are_shown(model, state):
 
 
 def test_a_newer_state_ends_the_correction(model, state):
-    other = model.controls.changed(state, {"emissivity_uncertainty": "0.03"})
+    other = model.controls.state_with(state, {"emissivity_uncertainty": "0.03"})
     picture = model.picture(other)
 
     def check():
@@ -153,7 +154,30 @@ def test_a_session_says_that_it_corrects_and_sends_the_picture_again(model, pict
     assert before.corrected is None and after.corrected is not None
 
 
+def test_a_corrected_file_opens_with_its_images_and_bars(picture, tmp_path):
+    correction = picture.corrected.correction
+    write_correction(correction, tmp_path / "corrected.nc")
+    view, sent = View(open_any(tmp_path / "corrected.nc")), []
+    view.page._send_msg = sent.append
+    session = view.session
+    session._painted.set()
+    session._picture(session.state)
+    shown = session.model.picture(session.state).panels
+    data = correction.data.isel(time=0)
+    assert list(shown) == ["measured", "corrected", "half_width"]
+    np.testing.assert_array_equal(
+        shown["corrected"].values, data["temperature"].values - ZERO_CELSIUS
+    )
+    half = (data["upper"].values - data["lower"].values) / 2
+    np.testing.assert_array_equal(shown["half_width"].values, half)
+    statuses = [one["content"] for one in sent if one["kind"] == "status"]
+    assert statuses[-1]["text"].startswith("Corrected: ")
+    html = next(one["content"] for one in sent if one["kind"] == "numbers")
+    assert "Contributions to its standard uncertainty" in html
+    assert "error of the correction" not in html  # no truth, no error
+
+
 def test_without_a_blur_the_page_says_why_there_is_no_correction(model, state):
-    ideal = model.controls.changed(state, {"camera.psf": "none"})
+    ideal = model.controls.state_with(state, {"camera.psf": "none"})
     with pytest.raises(ValueError, match=r"no point spread function; state camera\.psf"):
         model.corrected(model.picture(ideal), lambda: None)

@@ -20,7 +20,7 @@ from chipglow.camera import (
     MeasuredPSF,
     Measurement,
 )
-from chipglow.camera.exposure import View, expose, frame_weights
+from chipglow.camera.exposure import SpectralView, expose, frame_weights
 from chipglow.camera.optics.sampling import integrate, overlap_lengths, sensor_raster
 from chipglow.io import read_measurement, write_measurement
 from chipglow.radiometry import Band
@@ -136,7 +136,7 @@ def test_the_ends_of_the_tables_are_as_exact(temperature):
 def test_peaks_and_centre():
     scene, surface = random_scene(frames=5)
     band = Camera().band
-    (exposure,) = expose(scene, [View(surface.prepare(scene), band)], 0.0, 5 * STEP)
+    (exposure,) = expose(scene, [SpectralView(surface.prepare(scene), band)], 0.0, 5 * STEP)
     temperature = scene.data["temperature"].values
     radiance = surface.values * band.radiance(temperature.astype(np.float64))
     # float32 has a step of 6e-8, the look-up is within 4e-7

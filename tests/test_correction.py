@@ -217,6 +217,70 @@ def test_the_outline_is_found():
     assert abs(found + off * normal[0]) < 0.05 * PITCH
 
 
+def test_cells_are_cut_exactly():
+    pixels = Raster(0.0, 12 * PITCH, PITCH, 12, 12)
+    for position, lean in ((0.603, 0.0), (0.55, 0.3)):
+        chip, tool = zones(pixels)
+        tool = replace(tool, shape=half_plane(pixels, position, lean))
+        parts = cut_cells(ShapedObject((chip, tool), pixels), pixels)
+        found = parts.area[parts.zone == 1].sum()
+        expected = 24**2 * (1 - position - lean / 2)
+        # Each of the 24 cut rows of cells errs by up to 1/2000 of a cell, at random.
+        assert abs(found - expected) < 0.01
+
+
+@pytest.mark.parametrize("off", [0.45, -0.45])
+def test_the_outline_of_a_heated_chip_is_found_and_does_not_slide_along_itself(off):
+    _, emissivity, samples, pixels = scene()
+    x, y = np.meshgrid(samples.x, samples.y)
+    edge = EDGE * 24 * PITCH + 0.2 * y
+    chip = 850.0 + 300.0 * np.exp(np.minimum(x - edge, 0.0) / (5 * PITCH))
+    tool = 450.0 + 700.0 * np.exp(-np.maximum(x - edge, 0.0) / (12 * PITCH))
+    kelvins = np.where(emissivity == 0.58, tool, chip)
+    image = measured(kelvins, emissivity, samples, pixels)
+    moved = zones(pixels, EDGE + off / 24)
+    result = correct(
+        image, CAMERA, moved, surroundings=DARK, noise=0.5, outline_uncertainty=0.5 * PITCH
+    )
+    motion = result.data["outline_motion"][0].values[:2] / PITCH
+    normal = np.array([1.0, -0.2]) / np.hypot(1.0, 0.2)
+    # The goal of the method where the radiance changes by 10 % or more across the outline.
+    assert abs(motion @ normal + off * normal[0]) < 0.05
+    # Nothing shows a motion along a straight outline: it stays below its standard uncertainty.
+    assert abs(motion @ [normal[1], -normal[0]]) < 0.5
+
+
+def test_the_radiance_continues_beyond_the_image():
+    count, more = 16, 12
+    pixels = Raster(0.0, count * PITCH, PITCH, count, count)
+    size = (count + 2 * more) * SAMPLES
+    samples = Raster(-more * PITCH, (count + more) * PITCH, PITCH / SAMPLES, size, size)
+    kelvins = np.broadcast_to(900.0 + 15.0 * (samples.x / PITCH - count / 2), samples.shape)
+    formation = image_formation(CAMERA, samples, pixels=pixels)
+    light = formation.forward(0.5 * BAND.radiance(kelvins))
+    image = Measurement.from_radiance(light[None], BAND, np.zeros(1), pixels)
+    result = correct(image, CAMERA, [Zone("plate", 0.5)], surroundings=DARK, noise=0.1)
+    truth = 900.0 + 15.0 * (pixels.x / PITCH - count / 2)
+    error = result.data["temperature"][0].values - truth
+    # If all but a pixel beyond the image has the radiance of its edge, errors reach 4.5 K.
+    assert np.abs(error[:, [0, -1]]).max() < 3.0
+
+
+def test_the_resolution_counts_the_data():
+    """The squares of the resolution side by side need as many data as the image has, or fewer."""
+    kelvins, emissivity, samples, pixels = scene()
+    image = measured(kelvins, emissivity, samples, pixels)
+
+    def data(noise):
+        found = correct(image, CAMERA, zones(pixels), surroundings=DARK, noise=noise)
+        return float(((PITCH / found.data["resolution"][0]) ** 2).sum())
+
+    few, many = data(5.0), data(0.5)
+    # Twelve draws estimate the trace to some percent; a tenth of the noise shows more detail.
+    assert 10 < few < 0.8 * many
+    assert many < 1.1 * pixels.rows * pixels.columns
+
+
 def test_pixels_out_of_range_have_one_bound():
     kelvins, emissivity, samples, pixels = scene()
     plain = measured(kelvins, emissivity, samples, pixels)
@@ -263,6 +327,33 @@ def test_places_of_a_result(chip_and_tool, tmp_path):
     assert again.data.equals(result.data)
     assert len(result.to_frame()) == 24 * 24
     assert "Correction" in repr(result)
+
+
+def test_a_notebook_shows_each_frame_of_a_result(chip_and_tool):
+    result, _, _ = chip_and_tool
+    html = result._repr_html_()
+    hottest = float(np.nanmax(result.data["temperature"])) - 273.15
+    assert "Correction: 1 frames of 24 x 24 pixels" in html
+    assert f"<td>{hottest:.6g}</td>" in html and "<td>576</td>" in html
+    assert "Noise" not in html  # which was stated
+    frame = result.to_frame()
+    assert (frame.measured.values == result.data["measured"][0].values.ravel()).all()
+    assert result.flags.shape == (1, 24, 24)
+
+
+@pytest.mark.parametrize(
+    "read",
+    [
+        lambda result: result.at((1e-5, 1e-5), 1),
+        lambda result: result.budget((1e-5, 1e-5), 1),
+        lambda result: result.contribution("noise", 1),
+        lambda result: result.to_frame(1),
+        lambda result: result.plot(1),
+    ],
+)
+def test_a_frame_that_does_not_exist_is_refused(chip_and_tool, read):
+    with pytest.raises(ValueError, match="frame: is 1, expected 0 to 0"):
+        read(chip_and_tool[0])
 
 
 def test_the_same_seed_gives_the_same_result(chip_and_tool):

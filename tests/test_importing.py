@@ -10,7 +10,14 @@ from moving_block import RATE, SPEED, UP, Broken, MovingBlock, strain_at
 
 from chipglow.io import open_scene, unfinished_scenes
 from chipglow.io.completion import Completion, complete, optical_flow, strain_rate_along
-from chipglow.io.importing import Import, View, import_scene, kept_import, prospect, read_scene
+from chipglow.io.importing import (
+    FieldOfView,
+    Import,
+    import_scene,
+    kept_import,
+    prospect,
+    read_scene,
+)
 from chipglow.io.sandbox import Isolated
 from chipglow.io.sources import SourceError, Units
 from chipglow.io.sources.grids.grid import GridSource
@@ -321,4 +328,4 @@ def test_what_is_out_of_view_may_be_colder(tmp_path):
     wanted = a_stack(tmp_path, values)
     with pytest.raises(SourceError, match="T: temperature 0 K, expected"):
         prospect(wanted)
-    prospect(replace(wanted, view=View(left=6e-6)))
+    prospect(replace(wanted, view=FieldOfView(left=6e-6)))

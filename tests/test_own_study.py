@@ -161,11 +161,14 @@ def test_a_response_file_weighs_the_band(tmp_path):
         ({"detector_pitch": "15 um"}, "magnification: must be given"),
         ({"detector_pitch": "-15 um", "magnification": 2}, "detector_pitch: -15 um must be more"),
         ({"pitch": "15 um", "magnification": 4}, "cannot be combined with pitch"),
-        ({"detector_pitch": "15 um", "magnification": -1}, "magnification: -1, must be positive"),
+        (
+            {"detector_pitch": "15 um", "magnification": -1},
+            "magnification: -1, expected more than 0",
+        ),
         ({"detector_pitch": "15 um", "magnification": 2.5, "pitch": "5 um"}, "magnification, 6 um"),
         (
             {"detector_pitch": "15 um", "magnification": 2.5, "pitch": "5 s"},
-            "camera: pitch: '5 s' is not a length",
+            "camera.pitch: '5 s' is not a length",
         ),
         ({"preset": "lepton"}, "'lepton' is unknown, expected one of flir-lepton-3"),
         ({"preset": {}}, "{} is unknown, expected one of flir-lepton-3"),
@@ -383,6 +386,26 @@ def test_what_is_stated_stays_when_another_setting_changes():
     study = Study(cutting={"feed": "0.1 mm", "field_of_view": view})
     other = changed(study, {"cutting.feed": "0.2 mm"})
     assert (other.cutting.field_of_view.rows, other.cutting.field_of_view.columns) == (300, 300)
+
+
+@pytest.mark.parametrize(
+    ("section", "stated", "name", "value"),
+    [
+        ("cutting", {"tool": {"rake_angle": "-20 deg"}}, "feed", "0.25 mm"),
+        ("cutting", {"feed": "0.2 mm", "window": {"start": "1 mm"}}, "feed", "0.25 mm"),
+        ("cutting", {"feed": "0.2 mm", "field_of_view": {"spacing": "1 um"}}, "feed", "0.1 mm"),
+        ("camera", {"pitch": "12 um", "integration_time": "40 us"}, "integration_time", "20 us"),
+        ("camera", {"band": "3-5 um"}, "band", "3.8-5.1 um"),
+    ],
+)
+def test_a_changed_study_is_the_study_with_the_change(section, stated, name, value):
+    direct = Study(**{section: {**stated, name: value}})
+    study = changed(Study(**{section: stated}), {f"{section}.{name}": value})
+    assert study == direct
+    assert (study.camera.derived, study.cutting.derived) == (
+        direct.camera.derived,
+        direct.cutting.derived,
+    )
 
 
 def test_the_camera_of_a_study_has_its_settings_and_checks_them_with_each_other():

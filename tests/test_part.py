@@ -15,8 +15,18 @@ from chipglow import quantities
 from chipglow.camera import PSFS, GaussianPSF, PointSpreadFunction
 from chipglow.io import ImportDescription, import_text
 from chipglow.laboratory.recordings import MeasurementDescription, measurement_text
-from chipglow.quantities import Family, Parameter, Part, adapter, made_from, problem
-from chipglow.quantities.units import LENGTH, TEMPERATURE, InSI
+from chipglow.quantities import (
+    Family,
+    Parameter,
+    Part,
+    adapter,
+    changed,
+    made_from,
+    placed,
+    problem,
+    rederived,
+)
+from chipglow.quantities.units import LENGTH, TEMPERATURE
 from chipglow.study import Study, study_text
 from chipglow.text import commented_yaml, json_schema
 
@@ -149,12 +159,27 @@ def test_a_field_with_another_default_keeps_its_declaration():
         Wide(3.0)
 
 
-def test_a_number_that_follows_from_others_needs_no_unit_but_is_checked():
-    assert read_from_file({"width": InSI(1.5)}) == read({"width": InSI(1.5)}) == Shelf(1.5)
-    assert type(read_from_file({"width": InSI(1.5)}).width) is float
-    for reader, message in ((read_from_file, "up to 2000000 um"), (read, "up to 2 m")):
-        with pytest.raises(ValidationError, match=message):
-            reader({"width": InSI(3.0)})
+def test_a_derived_value_is_checked_and_gives_way_to_a_given_one():
+    @dataclass(frozen=True)
+    class Door(Part):
+        """A door, as high as two widths."""
+
+        width: Annotated[float, Parameter("Of it.", LENGTH)] = 1.0
+        height: Annotated[float, Parameter("Of it.", LENGTH, most=4.0)] = 2.0
+
+        def __post_init__(self) -> None:
+            super().__post_init__()
+            self.derive(height=2 * self.width)
+
+    door = adapter(Door).validate_python({"width": "50 cm"}, context=FILE)
+    assert (door.height, door.given, door.derived) == (1.0, {"width"}, {"height"})
+    assert changed(door, {"width": 1.5}).height == 3.0
+    assert changed(changed(door, {"height": 1.2}), {"width": 1.5}).height == 1.2
+    assert rederived(door, height=3.0) == Door(0.5, 3.0)
+    assert rederived(door) == Door(0.5, 2.0)
+    assert rederived(Door(0.5, 1.2), height=3.0).height == 1.2
+    with pytest.raises(ValueError, match="height: 6 m, expected more than 0 m, up to 4 m"):
+        Door(3.0)
 
 
 def test_help_shows_plain_types():
@@ -253,3 +278,21 @@ def test_a_part_that_overrides_another_has_its_fields_or_none():
     assert (made.width, made.boards) == (1.5, None)
     with pytest.raises(ValueError, match=r"Change.width: 0 m, expected more than 0 m"):
         Change(width=0.0)
+
+
+def test_a_path_sets_a_value_in_parts_and_in_what_a_file_holds():
+    assert placed(None, {"units.length": "mm"}) == {"units": {"length": "mm"}}
+    held = {"terms": [{"kind": "veil"}, {"kind": "lag"}], "bits": 12}
+    assert placed(held, {"terms.1.kind": "netd", "bits": 14, "terms.0.radius": 2}) == {
+        "terms": [{"kind": "veil", "radius": 2}, {"kind": "netd"}],
+        "bits": 14,
+    }
+    assert held["terms"][1] == {"kind": "lag"}
+    with pytest.raises(ValueError, match=r"5: expected a position in a list"):
+        placed(held, {"terms.5": {}})
+    study = changed(Study(), {"camera.psf": {"kind": "gaussian", "fwhm": 8e-6}})
+    assert changed(study, {"camera.psf.fwhm": 9e-6}).camera.psf == GaussianPSF(9e-6)
+    with pytest.raises(LookupError, match=r"camera\.lens"):
+        changed(study, {"camera.lens.focus": 1})
+    with pytest.raises(ValueError, match=r"camera\.detector\.response: is missing"):
+        changed(study, {"camera.detector.bits": 12})

@@ -125,7 +125,7 @@ def test_bands_of_which_one_holds_the_other_have_a_range():
 def test_views_of_several_bands_are_those_of_each_alone(analytic_scene):
     surfaces = [replace(chip, follow="mean").prepare(analytic_scene) for chip in (CHIP_1, CHIP_2)]
     views = [
-        cam.View(surface, band, reflected)
+        cam.SpectralView(surface, band, reflected)
         for surface in surfaces
         for band, reflected in ((SHORT, None), (LONG, 400.0), (SHORT, 900.0))
     ]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from chipglow.camera import Camera, View, expose
+from chipglow.camera import Camera, SpectralView, expose
 from chipglow.radiometry import Band
 from chipglow.scene import Material, Raster, Scene, ToolGeometry
 from chipglow.surface import CHIP_1, CHIP_2, EmissivityStack, Exchange, UniformSurface, Wedge
@@ -366,7 +366,7 @@ def test_several_surfaces_are_seen_as_each_alone():
     scene = a_scene(-7.0)
     surfaces = [chip.modified(Wedge()) for chip in (CHIP_1, CHIP_2)]
     surfaces += [CHIP_1.modified(Wedge(mirror=1.0)), CHIP_2]
-    views = [View(CAMERA.prepare(surface, scene), BAND) for surface in surfaces]
+    views = [SpectralView(CAMERA.prepare(surface, scene), BAND) for surface in surfaces]
     for chosen in (slice(0, 2), slice(0, 4)):
         together = expose(scene, views[chosen], 0.0, 1e-5)
         for exposure, surface in zip(together, surfaces[chosen], strict=True):

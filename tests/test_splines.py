@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from chipglow.camera.exposure import View, expose
+from chipglow.camera.exposure import SpectralView, expose
 from chipglow.io import SceneWriter, StoredScene, open_scene, unfinished_scenes, write_scene
 from chipglow.io.packing import read_chunk
 from chipglow.io.spline_file import STEPS
@@ -234,7 +234,9 @@ def test_a_pass_over_splines_is_that_over_their_samples(tmp_path, follow):
     surfaces = [replace(one, follow=follow, grain=7e-6) for one in (CHIP_1, CHIP_2, BOUNDED)]
     for start, duration in ((0.0, 6 * STEP), (0.3 * STEP, 3.1 * STEP)):
         passes = [
-            expose(one, [View(s.prepare(one), BAND, 500.0) for s in surfaces], start, duration)
+            expose(
+                one, [SpectralView(s.prepare(one), BAND, 500.0) for s in surfaces], start, duration
+            )
             for one in (scene, samples)
         ]
         for found, expected in zip(*passes, strict=True):
@@ -250,7 +252,7 @@ def test_a_row_that_begins_later_is_that_of_a_later_exposure(tmp_path, surface):
     scene = open_scene(a_file(tmp_path / "scene.nc"))
     delays = np.repeat([0.0, 0.7, 1.5, 3.0], RASTER.rows)[::4][: RASTER.rows] * STEP
     for one in (scene, in_memory(scene)):
-        views = [View(surface.prepare(one), BAND)]
+        views = [SpectralView(surface.prepare(one), BAND)]
         (rolling,) = expose(one, views, 0.3 * STEP, 2.2 * STEP, delays)
         for delay in set(delays.tolist()):
             (later,) = expose(one, views, 0.3 * STEP + delay, 2.2 * STEP)
@@ -265,7 +267,7 @@ def test_the_pass_does_not_depend_on_the_number_of_threads(tmp_path):
     try:
         for threads in (1, before):
             numba.set_num_threads(threads)
-            found += expose(scene, [View(CHIP_1.prepare(scene), BAND)], 0.0, 6 * STEP)
+            found += expose(scene, [SpectralView(CHIP_1.prepare(scene), BAND)], 0.0, 6 * STEP)
     finally:
         numba.set_num_threads(before)
     np.testing.assert_array_equal(found[0].mean_radiance, found[1].mean_radiance)
@@ -288,5 +290,5 @@ def test_only_what_a_surface_needs_is_read(tmp_path, monkeypatch):
     ):
         field = surface.prepare(scene)
         read.clear()
-        expose(scene, [View(field, BAND)], 0.0, 6 * STEP)
+        expose(scene, [SpectralView(field, BAND)], 0.0, 6 * STEP)
         assert sorted(read) == sorted((name, index) for name in names for index in range(6))

@@ -107,7 +107,7 @@ def test_the_default_study_has_the_librarys_defaults():
     assert cutting.tool.build() == ToolGeometry()
     assert cutting.friction == Friction()
     assert cutting.numerics == Numerics()
-    assert cutting.window == OutputWindow()
+    assert cutting.window.build() == OutputWindow()
     assert camera == Camera.paper()
     assert study.analysis == Plan()
     chips = study.surface.build(study.seed)

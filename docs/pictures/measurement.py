@@ -10,7 +10,7 @@ import numpy as np
 import chipglow
 from chipglow.analysis import error_images
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.scales import KELVIN
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Material
 from chipglow.scene.figures import ImagePanel, image_figure
 
@@ -33,9 +33,9 @@ def main() -> None:
     exposure = camera.expose(scene, chipglow.CHIP_2, start=START)
     images = error_images(camera, exposure, reference="true-maximum")
     frame = scene.frame(scene.frame_at(START + camera.integration_time / 2))
-    true = np.where(frame.material == Material.VOID, np.nan, frame.temperature - KELVIN)
+    true = np.where(frame.material == Material.VOID, np.nan, frame.temperature - ZERO_CELSIUS)
     usable = ~images.flagged.values
-    measured = np.where(usable, images.measured.values - KELVIN, np.nan)
+    measured = np.where(usable, images.measured.values - ZERO_CELSIUS, np.nan)
     error = np.where(usable, images.case_1.values, np.nan)
     limit = scales.round_limit(error, 99.0, 50.0)
     heat = (0.0, scales.round_limit(true, 99.9, 50.0))

@@ -16,8 +16,8 @@ from chipglow.analysis import RatioPair, ratio_errors, wavelengths_frame
 from chipglow.analysis.wavelength_figure import draw_wavelengths
 from chipglow.analysis.wavelengths import band_name
 from chipglow.drawing import drawing
-from chipglow.drawing.scales import HEAT, KELVIN, SIGNED
-from chipglow.quantities import changed
+from chipglow.drawing.scales import HEAT, SIGNED
+from chipglow.quantities import ZERO_CELSIUS, changed
 from chipglow.radiometry import Band, RatioThermometer
 from chipglow.scene import Raster
 from chipglow.scene.figures import image_figure, show_image
@@ -33,7 +33,7 @@ DETECTOR = {
     "terms": [{"kind": "shot-noise"}, {"kind": "read-noise", "standard_deviation": 400}],
 }
 METAL = {"kind": "hagen-rubens", "resistivity": "6e-7 ohm*m"}
-HOT = 400.0 + KELVIN
+HOT = 400.0 + ZERO_CELSIUS
 CAUSES = ("motion", "footprint", "optics", "misregistration")
 
 
@@ -84,7 +84,7 @@ def draw_images(errors: xr.Dataset, raster: Raster, tool: Any) -> None:
         axes = figure.subplots(3, 2, sharex=True, sharey=True)
         shown = {"true temperature": errors.truth, "ratio temperature": errors.measured}
         for axis, (title, image) in zip(axes.flat, shown.items(), strict=False):
-            celsius = image.values - KELVIN
+            celsius = image.values - ZERO_CELSIUS
             heat = show_image(axis, celsius, raster, tool, HEAT, (20.0, 800.0))
             axis.set_title(title)
         drawing.colour_bar(figure, heat, axes[0], "°C")
@@ -106,7 +106,7 @@ def print_study(grey: xr.Dataset, metal: xr.Dataset) -> None:
     for place, rows in frame.groupby("place", sort=False):
         truth = grey.truth.sel(place=place)
         count = int(truth.count())
-        print(f"{place}: {truth.mean() - KELVIN:.0f} °C ± {truth.std():.0f} K, {count} draws")
+        print(f"{place}: {truth.mean() - ZERO_CELSIUS:.0f} °C ± {truth.std():.0f} K, {count} draws")
         for row in rows.sort_values("total_K").itertuples():
             cells = [
                 f"{row.first_um} / {row.second_um}" if row.second_um else f"{row.first_um} alone",

@@ -13,8 +13,9 @@ from matplotlib.axes import Axes
 import chipglow
 from chipglow.camera import Measurement
 from chipglow.drawing import drawing
-from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
 from chipglow.laboratory.chip import rake_grid
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.surface import CHIP_1, Wedge
 
 matplotlib.use("Agg")
@@ -74,7 +75,7 @@ def draw_profiles(axes: Axes, without: Measurement, reflecting: Measurement) -> 
         assert measured.tool is not None
         grid = rake_grid(measured, measured.tool)
         for row, line in ((0, "-o"), (1, "--s")):
-            values = grid.frame_mean[row] - KELVIN
+            values = grid.frame_mean[row] - ZERO_CELSIUS
             depth = f"{1e6 * grid.depth[row]:.0f} µm"
             text = f"{label}, {depth}"
             axes.plot(1e6 * grid.along, values, line, color=colour, ms=3, label=text)

@@ -19,7 +19,8 @@ More: :doc:`/understand/physics`.
 import numpy as np
 
 from chipglow.drawing.drawing import new_figure, style
-from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.surface import Fresnel, ParabolicOxide
 
 IN_VIEW = 0.4e-3
@@ -36,7 +37,7 @@ with style():
     figure = new_figure(2.8)
     left, right = figure.subplots(1, 2)
     for celsius, colour in TEMPERATURES.items():
-        grown = np.sqrt(law.growth(celsius + KELVIN) * time)
+        grown = np.sqrt(law.growth(celsius + ZERO_CELSIUS) * time)
         left.plot(time, law.of_thickness(CHIP_1, grown), color=colour, label=f"{celsius} °C")
     left.axvspan(time[0], IN_VIEW, color=GREY, alpha=0.3, lw=0)
     left.text(1.6e-6, 0.72, "in view", fontsize=8)
@@ -54,7 +55,7 @@ with style():
 # The page's table: thickness and change of the emissivity after 0.4 ms, and the ratio by angle.
 
 for celsius in TEMPERATURES:
-    seen = float(np.sqrt(law.growth(celsius + KELVIN) * IN_VIEW))
+    seen = float(np.sqrt(law.growth(celsius + ZERO_CELSIUS) * IN_VIEW))
     change = float(law.of_thickness(CHIP_1, seen)) - CHIP_1
     print(f"{celsius} °C: {1e9 * seen:.2f} nm, {change:.4f}")
 for name, (surface, _) in SURFACES.items():

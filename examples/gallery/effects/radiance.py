@@ -24,8 +24,8 @@ import numpy as np
 import chipglow
 from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import BLUE, GREEN, VERMILLION
+from chipglow.quantities import ZERO_CELSIUS
 
-KELVIN = 273.15
 ENVIRONMENT = 293.0
 
 
@@ -36,7 +36,7 @@ def radiance_temperature(band, true, emissivity):
 
 
 celsius = np.linspace(300.0, 1000.0, 141)
-true = celsius + KELVIN
+true = celsius + ZERO_CELSIUS
 mid_wave, long_wave = chipglow.Band(3.8e-6, 5.1e-6), chipglow.Band(7.5e-6, 13e-6)
 
 with style():
@@ -58,5 +58,5 @@ with style():
 # The same numbers, to compare with:
 
 for emissivity in (0.42, 0.77):
-    seen = radiance_temperature(mid_wave, 700.0 + KELVIN, emissivity)
-    print(f"emissivity {emissivity}: 700 °C is seen as {float(seen) - KELVIN:.1f} °C")
+    seen = radiance_temperature(mid_wave, 700.0 + ZERO_CELSIUS, emissivity)
+    print(f"emissivity {emissivity}: 700 °C is seen as {float(seen) - ZERO_CELSIUS:.1f} °C")

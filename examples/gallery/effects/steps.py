@@ -29,7 +29,8 @@ from samples.chip import closed_form_chip
 
 import chipglow
 from chipglow.drawing.drawing import new_figure, style
-from chipglow.drawing.scales import HEAT, KELVIN
+from chipglow.drawing.scales import HEAT
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene.figures import show_image
 
 # %%
@@ -54,7 +55,7 @@ with style():
     figure.set_layout_engine("compressed")
     for axes, (name, camera) in zip(figure.subplots(2, 2).flat, cameras.items(), strict=True):
         seen = camera.measure(scene, chipglow.CHIP_2, start)
-        celsius = seen.radiance_temperature()[0] - KELVIN
+        celsius = seen.radiance_temperature()[0] - ZERO_CELSIUS
         picture = show_image(axes, celsius, seen.raster, scene.tool, HEAT, (100.0, 600.0))
         axes.label_outer()
         axes.set_title(f"{name}: {np.nanmax(celsius):.0f} °C")

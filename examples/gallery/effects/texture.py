@@ -24,7 +24,8 @@ from samples.chip import closed_form_chip
 
 import chipglow
 from chipglow.drawing.drawing import new_figure, style
-from chipglow.drawing.scales import HEAT, KELVIN, PLAIN
+from chipglow.drawing.scales import HEAT, PLAIN
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene.figures import show_image
 
 scene = closed_form_chip(40)
@@ -40,7 +41,7 @@ with style():
     for axes, (name, surface) in zip(rows, surfaces.items(), strict=True):
         laid = camera.prepare(surface, scene).emissivity(scene.frame(24))
         seen = camera.measure(scene, surface, scene.times[24])
-        celsius = seen.radiance_temperature()[0] - KELVIN
+        celsius = seen.radiance_temperature()[0] - ZERO_CELSIUS
         left = show_image(axes[0], laid, scene.raster, scene.tool, PLAIN, (0.2, 1.0))
         right = show_image(axes[1], celsius, seen.raster, scene.tool, HEAT, (100.0, 600.0))
         axes[0].set_title(f"{name}: emissivity")

@@ -22,7 +22,8 @@ from pyvista import examples
 
 import chipglow
 from chipglow.drawing.drawing import new_figure, style
-from chipglow.drawing.scales import HEAT, KELVIN
+from chipglow.drawing.scales import HEAT
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Material
 
 FILE = examples.hexbeamfile
@@ -39,7 +40,7 @@ with style():
         wanted = [*SIDE, f"fields.temperature={field}", f"mesh.section={section}"]
         scene = chipglow.read_scene(chipglow.load_import(FILE, wanted).build())
         frame = scene.frame(0)
-        values = np.where(frame.material == Material.VOID, np.nan, frame.temperature - KELVIN)
+        values = np.where(frame.material == Material.VOID, np.nan, frame.temperature - ZERO_CELSIUS)
         picture = axes.imshow(values, extent=scene.raster.extent, cmap=HEAT)
         axes.set_title(title, fontsize=8)
         axes.set(xlabel="x / m", ylabel="z / m")

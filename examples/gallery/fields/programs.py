@@ -22,7 +22,8 @@ import sample_files
 
 import chipglow
 from chipglow.drawing.drawing import new_figure, style
-from chipglow.drawing.scales import HEAT, KELVIN
+from chipglow.drawing.scales import HEAT
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Material
 from chipglow.scene.figures import show_image
 
@@ -56,7 +57,7 @@ with style():
         scene = imported(name)
         frame = scene.frame(0)
         there = frame.material == Material.WORKPIECE
-        celsius = np.where(there, frame.temperature - KELVIN, np.nan)
+        celsius = np.where(there, frame.temperature - ZERO_CELSIUS, np.nan)
         picture = show_image(axes, celsius, scene.raster, None, HEAT, (100.0, 600.0))
         axes.set_title(program)
         axes.label_outer()

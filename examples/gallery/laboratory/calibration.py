@@ -35,14 +35,15 @@ from chipglow.camera import (
     find_bad_pixels,
 )
 from chipglow.drawing.drawing import new_figure, style
-from chipglow.drawing.scales import HEAT, KELVIN
+from chipglow.drawing.scales import HEAT
 from chipglow.laboratory.recordings import calibrate_recording, fit_calibration
 from chipglow.laboratory.recordings.figure import draw_calibrations
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.radiometry import Band
 from chipglow.scene.figures import show_image
 
 BAND = Band(3.8e-6, 5.1e-6)
-KELVINS = np.arange(300.0, 1001.0, 100.0) + KELVIN
+KELVINS = np.arange(300.0, 1001.0, 100.0) + ZERO_CELSIUS
 COUNT_UNCERTAINTY, TEMPERATURE_UNCERTAINTY = 2.0, 0.3
 
 rng = np.random.default_rng(3)
@@ -66,7 +67,7 @@ for lower, upper, coldest, hottest in (
     (7.5, 13.0, 0, 300),
 ):
     band = Band(lower * 1e-6, upper * 1e-6)
-    kelvins = np.linspace(coldest, hottest, 141) + KELVIN
+    kelvins = np.linspace(coldest, hottest, 141) + ZERO_CELSIUS
     fit = fit_calibration(
         SakumaHattori, kelvins, band.radiance(kelvins), band, temperature_uncertainty=1.0
     )
@@ -122,7 +123,7 @@ with style():
     panels = non_uniformity.subplots(1, 2, sharey=True)
     titles = ("the pixels as they are", "two-point correction, bad pixels replaced")
     for axes, measured, title in zip(panels, (plain, corrected), titles, strict=True):
-        celsius = measured.radiance_temperature()[0] - KELVIN
+        celsius = measured.radiance_temperature()[0] - ZERO_CELSIUS
         picture = show_image(axes, celsius, measured.raster, None, HEAT, (400.0, 800.0))
         axes.set_title(title)
         axes.label_outer()

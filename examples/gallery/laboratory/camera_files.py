@@ -26,7 +26,8 @@ import sample_files
 
 import chipglow
 from chipglow.drawing.drawing import new_figure, style
-from chipglow.drawing.scales import HEAT, KELVIN, PLAIN
+from chipglow.drawing.scales import HEAT, PLAIN
+from chipglow.quantities import ZERO_CELSIUS
 
 simulated = chipglow.read_recording(sample_files.folder("camera-files") / "chip.hcc")
 
@@ -38,7 +39,7 @@ with TemporaryDirectory() as folder:
     packed = sample_files.HERE.parent / "tests" / "reference" / "flir" / "t420.fff.xz"
     path.write_bytes(lzma.decompress(packed.read_bytes()))
     real = chipglow.read_recording(path)
-celsius = real.conversion.temperature(real.signal[0]) - KELVIN
+celsius = real.conversion.temperature(real.signal[0]) - ZERO_CELSIUS
 
 with style():
     figure = new_figure(2.6)

@@ -23,14 +23,15 @@ import sample_files
 
 import chipglow
 from chipglow.drawing.drawing import new_figure, style
-from chipglow.drawing.scales import GREY, KELVIN, VERMILLION
+from chipglow.drawing.scales import GREY, VERMILLION
 from chipglow.laboratory.emissivity import emissivity_line
+from chipglow.quantities import ZERO_CELSIUS
 
 files = sample_files.folder("emissivity")
 regions = chipglow.load_regions(files / "regions.yaml")
 maps = []
 for name, celsius in (("chip.nc", 391.0), ("570.nc", 570.0)):
-    heating = chipglow.Heating(celsius + KELVIN, 293.0, 2.0, 1.0, 2.0)
+    heating = chipglow.Heating(celsius + ZERO_CELSIUS, 293.0, 2.0, 1.0, 2.0)
     maps.append(chipglow.determine_emissivity([chipglow.read_measurement(files / name)], heating))
 image = chipglow.read_measurement(files / "470.nc")
 
@@ -39,9 +40,12 @@ for area in chipglow.areas(regions, image.raster):
     seen = float(image.band.temperature(image.radiance[:, area.mask].mean()))
     line = emissivity_line([one.of(area).line for one in maps])
     found = chipglow.true_temperature([image], area, line)
-    rows.append((area.name, seen - KELVIN, found.estimate))
-    true, expanded = float(found.estimate.values) - KELVIN, found.estimate.expanded_uncertainty()
-    print(f"{area.name}: seen as {seen - KELVIN:.1f} °C, ({true:.1f} ± {expanded:.1f}) °C")
+    rows.append((area.name, seen - ZERO_CELSIUS, found.estimate))
+    true, expanded = (
+        float(found.estimate.values) - ZERO_CELSIUS,
+        found.estimate.expanded_uncertainty(),
+    )
+    print(f"{area.name}: seen as {seen - ZERO_CELSIUS:.1f} °C, ({true:.1f} ± {expanded:.1f}) °C")
 
 with style():
     figure = new_figure(2.4)
@@ -49,7 +53,7 @@ with style():
     for place, (_, seen, estimate) in enumerate(rows):
         axes.plot(seen, place, "s", color=GREY, label="radiance temperature" if not place else None)
         axes.errorbar(
-            float(estimate.values) - KELVIN,
+            float(estimate.values) - ZERO_CELSIUS,
             place,
             xerr=estimate.expanded_uncertainty(),
             fmt="o",

@@ -33,11 +33,17 @@ _SAMPLES: Final = 3
 """Samples along a pixel."""
 
 _ROWS: Final = 50
+"""Pixels along the image's height."""
+
 _COLUMNS: Final = 80
 """Pixels of an image, which is wider where a chip's regions are."""
 
 _CHIP_ROWS: Final = (8, 42)
-_MARGIN: Final = 2
+"""First and last row of the body in pixels."""
+
+_REGION_MARGIN: Final = 2
+"""Pixels between the ends of a body and its region."""
+
 _TOOL_MARGIN: Final = 3.0
 """Pixels at the edge of chip and tool that are not read."""
 
@@ -106,7 +112,9 @@ def _heated_chip(
     regions = tuple(
         Region(
             f"{name} {title}",
-            Polygon.rectangle((at - half, first + _MARGIN), (at + half, last - _MARGIN)),
+            Polygon.rectangle(
+                (at - half, first + _REGION_MARGIN), (at + half, last - _REGION_MARGIN)
+            ),
             feature,
         )
         for title, feature, at, half in (

@@ -10,7 +10,7 @@ import xarray as xr
 
 from chipglow.analysis.distribution import PIXEL_PHASE, Distribution
 from chipglow.analysis.images import ALL, WITHOUT_PSF
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 
 _DRAWS = ("exposure", "texture", "pixel_phase")
 
@@ -171,7 +171,7 @@ def readings_frame(data: xr.Dataset) -> pd.DataFrame:
             "place": one.place,
             "reading": one.quantity,
             "draws": one.error.draws,
-            "reference_degC": one.reference.mean - 273.15,
+            "reference_degC": one.reference.mean - ZERO_CELSIUS,
             "error_K": one.error.mean,
             "standard_deviation_K": one.error.standard_deviation,
             "least_K": one.error.range[0],

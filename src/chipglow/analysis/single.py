@@ -43,7 +43,8 @@ _BLUR_WIDTHS: Final = 3.0
 _PIXELS: Final = 4.0
 """Further margin in pixels."""
 
-_TEXTURES: Final = 2**31
+_SEEDS: Final = 2**31
+"""Seeds of textures and noise: those that fit into 31 bits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +146,7 @@ class SingleReadings:
         `draw` gives a number from 0 to 1 for each of `random`. The fractions of the place's pixels
         are those below the lower range limit, and saturated.
         """
-        texture, noise = (int(draw.get(name, 0.0) * _TEXTURES) for name in (TEXTURE, NOISE))
+        texture, noise = (int(draw.get(name, 0.0) * _SEEDS) for name in (TEXTURE, NOISE))
         moved = np.multiply([draw.get(name, 0.0) for name in (ACROSS, DOWN)], camera.pitch)
         right, down = (moved + camera.offset).tolist()
         seen = replace(camera, shape=None, offset=(right, down)).redrawn(noise)

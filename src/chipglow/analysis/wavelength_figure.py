@@ -17,6 +17,7 @@ _BEST: Final = 3
 """Bands alone, and pairs, of which the parts of the error are drawn."""
 
 _TICKS: Final = (1, 2, 3, 5, 7, 10, 20, 30, 50, 70, 100, 200, 300, 500)
+"""Ticks of the colour bar in K."""
 
 _PARTS: Final = {
     "error_K": ("mean error", scales.VERMILLION),

@@ -21,9 +21,10 @@ from chipglow.camera import Camera, Exposure, frame_weights
 from chipglow.camera.chain import Chain, ExposedChain, chains_in_bands, expose_chains
 from chipglow.camera.effect import EVERY, Effect
 from chipglow.camera.exposure import surroundings_radiance
-from chipglow.quantities import Array, Parameter, Part
+from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
 from chipglow.quantities.units import INSTANT, POSITION, WAVELENGTHS
 from chipglow.radiometry import Band, RatioThermometer
+from chipglow.radiometry.band import PAPER_BAND
 from chipglow.scene import Scene, sample
 from chipglow.scene.lines import nearest
 from chipglow.surface import Surface
@@ -71,7 +72,7 @@ class WavelengthPlan(Part):
         Band(1.5e-6, 1.7e-6),
         Band(2.0e-6, 2.4e-6),
         Band(3.2e-6, 3.8e-6),
-        Band(3.8e-6, 5.1e-6),
+        Band(*PAPER_BAND),
         Band(8.0e-6, 9.5e-6),
         Band(10e-6, 14e-6),
     )
@@ -184,7 +185,7 @@ def wavelengths_frame(data: xr.Dataset) -> pd.DataFrame:
     table = xr.Dataset(
         {
             "draws": data.truth.count("draw"),
-            "truth_degC": data.truth.mean("draw") - 273.15,
+            "truth_degC": data.truth.mean("draw") - ZERO_CELSIUS,
             "error_K": error.mean("draw"),
             **{f"{name}_K": data.step.sel(cause=name, drop=True).mean("draw") for name in STEPS},
             "standard_deviation_K": error.std("draw", ddof=1),

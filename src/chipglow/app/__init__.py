@@ -39,10 +39,10 @@ def explore(scene: "Scene | str | Path | None" = None, study: "Study | None" = N
     import panel as pn
 
     from chipglow.app.opening import open_any
-    from chipglow.app.view import View
+    from chipglow.app.view import PageView
 
     pn.extension(inline=True)  # its scripts come with it: nothing is loaded from the network
-    view = View(open_any(scene, study), embedded=True)
+    view = PageView(open_any(scene, study), embedded=True)
     view.start(None)
     return view.page
 

@@ -333,7 +333,7 @@ class Controls:
             EXPOSURE: [row.low, max(min(row.high, row.step * floor(room / row.step)), row.low)],
         }
 
-    def changed(self, state: State, texts: Texts) -> State:
+    def state_with(self, state: State, texts: Texts) -> State:
         """Return the state with some controls at other values; a ValueError names the control."""
         if unknown := [path for path in texts if path not in self.rows]:
             known = ", ".join(self.rows)

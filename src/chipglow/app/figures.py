@@ -19,13 +19,15 @@ from bokeh.models import (
 from bokeh.palettes import Cividis256, Inferno256, RdBu11, interp_palette
 from bokeh.plotting import figure
 
-from chipglow.app.controls import CURSOR, LINES
+from chipglow.app.controls import CORRECTION_IMAGES, CURSOR, LINES
 from chipglow.app.pictures import Drawn, Panel, Picture
 from chipglow.drawing.scales import HEAT, PLAIN, SIGNED
 from chipglow.quantities import Array
 from chipglow.scene import Raster, Tool
 
 MICRONS: Final = 1e6
+"""Micrometres in a metre: axes are in micrometres."""
+
 PALETTES: Final = {HEAT: Inferno256, PLAIN: Cividis256, SIGNED: interp_palette(RdBu11, 256)}
 """The colours of other figures; importing Matplotlib takes long."""
 
@@ -33,6 +35,8 @@ TITLES: Final = {
     "scene": "Scene: true temperature / °C",
     "measured": "Measured radiance temperature / °C",
     "error": "Error / K",
+    "corrected": "Corrected temperature / °C",
+    "half_width": f"{CORRECTION_IMAGES['half-width']} / K",
 }
 
 TEXT: Final = {"light": "#16191d", "dark": "#e8eaed"}
@@ -47,6 +51,8 @@ _REFERENCE: Final = "#7d858f"
 _CORRECTED: Final = "#c2571a"
 
 _BORDER: Final = 46
+"""Pixels on the left of a figure for its labels, the same for all, so that they are aligned."""
+
 _SIDE: Final = 180
 """Initial size of a frame in pixels; page.js fits the figures to the page."""
 
@@ -186,7 +192,7 @@ class Figures:
         }
         self.images = {name: Image(name, ranges, name == images[0]) for name in images}
         self.lines = {
-            name: Line(name, f"Temperature {where}", len(images) > 1)
+            name: Line(name, f"Temperature {where}", "error" in images)
             for name, where in along.items()
         }
         self.all = {name: one.figure for name, one in (self.images | self.lines).items()}

@@ -31,9 +31,9 @@ from chipglow.camera.chain import ExposedChain
 from chipglow.camera.exposure_kernels import Check
 from chipglow.camera.reference import TRUE
 from chipglow.correction import Correction, correct, observed_scene, scene_truth, surroundings_of
-from chipglow.drawing.scales import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
+from chipglow.drawing.scales import HEAT, PLAIN, SIGNED, ends, round_limit
 from chipglow.io import StoredScene
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 from chipglow.scene import Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 from chipglow.study import fit
@@ -83,7 +83,7 @@ class Panel(Brief):
 
 @dataclass(frozen=True)
 class CorrectedPixel:
-    """A corrected pixel: temperatures in K, expanded uncertainty, and uncertainty by source."""
+    """A corrected pixel: temperatures in K (NaN: unknown), expanded uncertainty, and by source."""
 
     temperature: float
     expanded_uncertainty: float
@@ -93,29 +93,42 @@ class CorrectedPixel:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Corrected(Brief):
-    """A part of an image, corrected, and its true temperature in K."""
+    """A part of an image, corrected, and its true temperature in K if it is known."""
 
     correction: Correction
-    true: Array
+    true: Array | None = None
+    frame: int = 0
+
+    @property
+    def data(self) -> xr.Dataset:
+        """The frame of the correction."""
+        return self.correction.data.isel(time=self.frame)
 
     def image(self, name: str) -> Array:
         """Return one of `CORRECTION_IMAGES`, or the corrected temperature, in K."""
-        data = self.correction.data.isel(time=0)
+        data = self.data
         temperature = np.asarray(data["temperature"].values, np.float64)
         if name == "half-width":
             return np.asarray((data["upper"].values - data["lower"].values) / 2)
-        shown = np.where(np.isnan(temperature), nan, self.true)
-        images = {"corrected": temperature, "true": shown, "error": temperature - self.true}
-        return images[name]
+        if name == "corrected":
+            return temperature
+        assert self.true is not None
+        return (
+            temperature - self.true
+            if name == "error"
+            else np.where(np.isnan(temperature), nan, self.true)
+        )
 
     def at(self, place: tuple[float, float]) -> CorrectedPixel | None:
         """Return the pixel at x and y in m; None without a corrected temperature."""
         try:
-            estimate = self.correction.at(place)
+            estimate = self.correction.at(place, self.frame)
         except ValueError:
             return None
-        budget = self.correction.budget(place)
-        true = float(nearest(self.true, self.correction.raster, place))
+        budget = self.correction.budget(place, self.frame)
+        true = nan
+        if self.true is not None:
+            true = float(nearest(self.true, self.correction.raster, place))
         return CorrectedPixel(
             float(estimate.values),
             float(estimate.expanded_uncertainty()),
@@ -146,7 +159,7 @@ class Picture(Brief):
     def lower_limit(self) -> float | None:
         """Lower range limit of the camera in °C."""
         limit = self.camera.lower_limit if self.camera else None
-        return None if limit is None else limit - KELVIN
+        return None if limit is None else limit - ZERO_CELSIUS
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -168,6 +181,15 @@ class SceneModel:
     controls: Controls
     file: str | None  # the scene as a saved study names it; None for the study's cut
     images: ClassVar[tuple[str, ...]] = ("scene", "measured", "error")
+
+    @property
+    def raster(self) -> Raster:
+        return self.scene.raster
+
+    @property
+    def tool(self) -> Tool | None:
+        return self.scene.tool
+
     _caches: dict[str, dict[Hashable, Any]] = field(
         init=False, default_factory=lambda: defaultdict(dict), repr=False
     )
@@ -215,7 +237,7 @@ class SceneModel:
             limits = panels["scene"].limits
             if np.isfinite(panels["measured"].values).any():
                 (low, high), (least, most) = limits, panels["measured"].limits
-                low = low if camera.lower_limit is None else camera.lower_limit - KELVIN
+                low = low if camera.lower_limit is None else camera.lower_limit - ZERO_CELSIUS
                 limits = min(least, low), max(most, high)
             panels |= {name: replace(panels[name], limits=limits) for name in ("scene", "measured")}
         picture = Picture(
@@ -277,7 +299,7 @@ class SceneModel:
         calibration = camera.calibration(raster.shape)
         if calibration and np.isfinite(numbers["measured"]):
             numbers["uncertainty"] = calibration.netd(numbers["measured"])
-        numbers["sample temperature"] = sample_of("temperature") + KELVIN
+        numbers["sample temperature"] = sample_of("temperature") + ZERO_CELSIUS
         numbers["sample emissivity"] = sample_of("emissivity")
         return numbers
 
@@ -328,7 +350,7 @@ class SceneModel:
         reference, measured, _ = np.moveaxis(readings.values[0, 0], -1, 0)
         error = measured - reference
         lines = {
-            name: np.concatenate(readings.along[row, 0, :, :, 1]) - KELVIN
+            name: np.concatenate(readings.along[row, 0, :, :, 1]) - ZERO_CELSIUS
             for row, name in enumerate(LINES)
         }
         is_known = np.isfinite(error).all()
@@ -421,7 +443,7 @@ class SceneModel:
         def make() -> NDArray[np.float32]:
             values = self._values(state, name, scene, exposure, index).astype(np.float32)
             void = scene.field("material", index) == Material.VOID
-            zero = np.float32(KELVIN if SCENE_IMAGES[name][1] == "°C" else 0.0)
+            zero = np.float32(ZERO_CELSIUS if SCENE_IMAGES[name][1] == "°C" else 0.0)
             return np.where(void, np.float32(nan), values - zero)
 
         return self._kept(6, "field", (name, scene.raster.shape, index, surface), make)
@@ -448,6 +470,14 @@ class MeasurementModel:
     measurement: Measurement
     controls: Controls
     coarse: ClassVar[None] = None
+
+    @property
+    def raster(self) -> Raster:
+        return self.measurement.raster
+
+    @property
+    def tool(self) -> Tool | None:
+        return self.measurement.tool
 
     @property
     def images(self) -> tuple[str, ...]:
@@ -492,7 +522,52 @@ class MeasurementModel:
         return int(np.abs(self.measurement.times - state.study.start).argmin())
 
 
-Model: TypeAlias = SceneModel | MeasurementModel
+@dataclass(eq=False)
+class CorrectionModel:
+    """A correction that `chipglow correct` wrote, its controls, and its frames as pictures."""
+
+    name: str
+    correction: Correction
+    controls: Controls
+    coarse: ClassVar[None] = None
+    tool: ClassVar[None] = None
+    images: ClassVar[tuple[str, ...]] = ("measured", "corrected", "half_width")
+
+    @property
+    def raster(self) -> Raster:
+        return self.correction.raster
+
+    def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
+        """Return the frame that began nearest to the state's start."""
+        frame = int(np.abs(self.correction.data["time"].values - state.study.start).argmin())
+        corrected, raster = Corrected(self.correction, frame=frame), self.raster
+        measured = corrected.data["measured"].values
+        data = xr.Dataset(
+            {"measured": (("y", "x"), measured), "flagged": (("y", "x"), np.isnan(measured))}
+        )
+        picture = Picture(
+            state, raster, data, {"measured": _measured_panel(data, raster)},
+            _lines(state, raster, data), {}, corrected=corrected,
+        )  # fmt: skip
+        shown = _with_correction(picture, corrected)
+        before = shown.panels
+        panels = {
+            "measured": before["scene"],
+            "corrected": before["measured"],
+            "half_width": before["error"],
+        }
+        return replace(shown, panels=panels)
+
+    def numbers(self, picture: Picture) -> dict[str, float]:
+        """Return the measured temperature at the cursor in K."""
+        return _at(picture.data, picture.raster, picture.state.cursor)
+
+    def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
+        """Return nothing: an error is not known without the truth."""
+        return {}
+
+
+Model: TypeAlias = SceneModel | MeasurementModel | CorrectionModel
 
 
 def with_samples(scene: Scene, count: int, fewer_frames: bool = False) -> Scene:
@@ -519,7 +594,7 @@ def _with_correction(picture: Picture, corrected: Corrected | None) -> Picture:
     shown, before = picture.state.study.correction_image, picture.panels
     raster = corrected.correction.raster if corrected else picture.raster
     unknown = np.full(raster.shape, nan)
-    temperature = corrected.image("corrected") - KELVIN if corrected else unknown
+    temperature = corrected.image("corrected") - ZERO_CELSIUS if corrected else unknown
     limits = before["measured"].limits
     if np.isfinite(temperature).any():
         limits = min(limits[0], np.nanmin(temperature)), max(limits[1], np.nanmax(temperature))
@@ -528,7 +603,7 @@ def _with_correction(picture: Picture, corrected: Corrected | None) -> Picture:
         unknown if corrected is None else corrected.image(shown),
     )
     if shown == "true":
-        last = Panel(title, "°C", third - KELVIN, raster, limits, HEAT)
+        last = Panel(title, "°C", third - ZERO_CELSIUS, raster, limits, HEAT)
     elif shown == "error":
         last = _error_panel(title, third, raster)
     else:
@@ -549,11 +624,14 @@ def _corrected_line(picture: Picture, corrected: Corrected | None, name: str) ->
     """Return the corrected temperature along a line, its interval and the true one in °C."""
     if corrected is None:
         return {"reference": np.full_like(picture.lines[name]["along"], nan)}
-    data = corrected.correction.data.isel(time=0).assign(true=(("y", "x"), corrected.true))
+    data = corrected.data
+    if corrected.true is not None:
+        data = data.assign(true=(("y", "x"), corrected.true))
     line = picture.state.line(name).line(picture.raster.spacing)
     return {
-        key: sample(data[variable].values, corrected.correction.raster, line.points) - KELVIN
+        key: sample(data[variable].values, corrected.correction.raster, line.points) - ZERO_CELSIUS
         for key, variable in _LINE_OF.items()
+        if variable in data
     }
 
 
@@ -577,7 +655,7 @@ def _lines(state: State, raster: Raster, data: xr.Dataset) -> dict[str, dict[str
     for name in LINES:
         line = state.line(name).line(raster.spacing)
         lines[name] = {"along": 1e6 * line.distance} | {
-            key: sample(data[key].values, raster, line.points) - KELVIN
+            key: sample(data[key].values, raster, line.points) - ZERO_CELSIUS
             for key in ("measured", "reference")
             if key in data
         }
@@ -596,7 +674,7 @@ def _crossings(state: State, tool: Tool | None) -> dict[str, float]:
 
 
 def _measured_panel(data: xr.Dataset, raster: Raster) -> Panel:
-    values = _unflagged(data, data["measured"]) - KELVIN
+    values = _unflagged(data, data["measured"]) - ZERO_CELSIUS
     limits = ends(values, 0.0, 100.0, 10.0)
     return Panel("Measured radiance temperature", "°C", values, raster, limits, HEAT)
 

@@ -12,7 +12,7 @@ from tornado.web import RequestHandler
 
 from chipglow.app.opening import OpenFiles
 from chipglow.app.pictures import Model
-from chipglow.app.view import View
+from chipglow.app.view import PageView
 
 LOCAL: Final = "127.0.0.1"
 TOKEN: Final = "token"
@@ -96,7 +96,7 @@ class App:
         opened = self.files.find(key)
         if opened is None:
             return pn.pane.HTML("<p>This file is no longer open: open it again.</p>")
-        view = View(opened, given, {OPEN: key} if key else {}, self.files)
+        view = PageView(opened, given, {OPEN: key} if key else {}, self.files)
         view.start(pn.state.curdoc)
         pn.state.on_session_destroyed(lambda _: view.end())
         return view.page

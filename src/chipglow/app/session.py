@@ -13,6 +13,8 @@ PAUSE: Final = 0.15
 """Seconds without a newer state after a quick look before the exact picture is begun."""
 
 PHASES: Final = 3
+"""Pixel phases along each axis of the app's draws."""
+
 TEXTURES: Final = 5
 """Draws of "Draw phases and textures": nine positions of the pixels and five textures."""
 
@@ -20,6 +22,7 @@ _PAINT_TIMEOUT: Final = 0.5
 """Seconds to wait for the page to paint a picture before the next one is sent."""
 
 _UNDO_STEPS: Final = 200
+"""Settings that can be undone."""
 
 _log = logging.getLogger(__name__)
 _Job = TypeVar("_Job")
@@ -96,11 +99,11 @@ class Session:
 
     def change(self, texts: Texts, final: bool = True) -> None:
         """Set controls; only a final state is one that `step` goes to."""
-        self._set(self.model.controls.changed(self.state, texts), final)
+        self._set(self.model.controls.state_with(self.state, texts), final)
 
     def restore(self, texts: Texts) -> None:
         """Set controls without a picture and without a step to undo, as `change` otherwise."""
-        self.state = self.model.controls.changed(self.state, texts)
+        self.state = self.model.controls.state_with(self.state, texts)
 
     def _set(self, state: State, final: bool) -> None:
         if final and state != self._settled[self._at]:
@@ -167,9 +170,9 @@ class Session:
 
     def _correct(self, picture: Picture, numbers: dict[str, float]) -> None:
         """Send the picture again with the corrected image, unless it has it already."""
-        assert isinstance(self.model, SceneModel)
         if picture.corrected is not None:
             return
+        assert isinstance(self.model, SceneModel)
         self._notify("correcting")
         corrected = self.model.corrected(picture, self._pictures.check)
         self._send(corrected)

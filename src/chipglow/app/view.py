@@ -27,8 +27,7 @@ from chipglow.app.figures import TEXT, Figures
 from chipglow.app.opening import MOST_UPLOADED, OpenFiles
 from chipglow.app.pictures import Drawn, Model, Picture, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
-from chipglow.drawing.scales import KELVIN
-from chipglow.quantities import Array
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.quantities.format import quantity_text, readable, rounded_text, uncertain_decimals
 
 _FOLDER: Final = Path(__file__).parent
@@ -36,7 +35,7 @@ _log = logging.getLogger(__name__)
 
 
 class Page(JSComponent):  # type: ignore[misc]
-    """The page around the figures; it exchanges messages with `View`."""
+    """The page around the figures; it exchanges messages with `PageView`."""
 
     html = param.String()
     figures = Children()
@@ -57,7 +56,7 @@ class Page(JSComponent):  # type: ignore[misc]
         self.alone(lambda: super(Page, self)._on_msg(ref, manager, msg))
 
 
-class View:
+class PageView:
     """A page and its session; a link gives `texts` of controls and other parameters, `link`."""
 
     def __init__(
@@ -77,8 +76,7 @@ class View:
             self.session.restore(texts or {})
         except ValueError as error:
             self._refused = f"Link: {error}"
-        shown = opened.scene if isinstance(opened, SceneModel) else opened.measurement
-        self.figures = Figures(shown.raster, shown.tool, opened.images)
+        self.figures = Figures(opened.raster, opened.tool, opened.images)
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._on_painted, self._on_theme = self.session.painted, self.figures.set_theme
@@ -243,7 +241,8 @@ class View:
         if picture.corrected is not None:
             raster = picture.corrected.correction.raster
             size = f"{raster.columns} × {raster.rows}"
-            return f"Corrected: {size} pixels around the cursor.", ""
+            around = "" if raster == picture.raster else " around the cursor"
+            return f"Corrected: {size} pixels{around}.", ""
         if picture.state.study.images == CORRECTION:
             return "Exact picture; the correction follows.", "busy"
         if shown in picture.absent:
@@ -387,7 +386,7 @@ def _texts(numbers: Mapping[str, float]) -> dict[str, str]:
     is_known = isfinite(uncertainty) and uncertainty > 0
     decimals = uncertain_decimals(uncertainty) if is_known else 1
     celsius = {
-        name: round(numbers[name] - KELVIN, decimals)
+        name: round(numbers[name] - ZERO_CELSIUS, decimals)
         for name in ("measured", "reference")
         if name in numbers
     }
@@ -406,7 +405,7 @@ def _quantity(value: float, unit: str, decimals: int, sign: str = "") -> str:
 
 
 def _celsius(kelvins: float) -> str:
-    return _quantity(kelvins - KELVIN, "°C", 1)
+    return _quantity(kelvins - ZERO_CELSIUS, "°C", 1)
 
 
 def _kelvins(kelvins: float) -> str:

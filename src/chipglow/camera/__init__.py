@@ -68,7 +68,7 @@ from chipglow.camera.detector.terms import (
 from chipglow.camera.effect import EVERY as EVERY, Effect as Effect
 from chipglow.camera.exposure import (
     Exposure as Exposure,
-    View as View,
+    SpectralView as SpectralView,
     expose as expose,
     frame_weights as frame_weights,
 )

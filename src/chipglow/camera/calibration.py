@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
-from typing import Any, ClassVar, Final
+from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera.recording import MeasuringRange, PlanckConversion
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import Array, Brief, Parameter
 from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import SECOND_RADIATION_CONSTANT
@@ -22,8 +22,11 @@ from chipglow.uncertainty.estimate import factor
 CALIBRATION: Final = "calibration"
 """Name of the component of uncertainty due to a calibration."""
 
-_CHECKED: Final = 101
-_NODES: Final = 513
+_CHECKED_TEMPERATURES: Final = 101
+"""Temperatures at which a calibration is checked to rise."""
+
+_INVERSE_NODES: Final = 513
+"""Nodes of the inverse of a calibration."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,8 +78,18 @@ class CalibrationErrors(Brief):
         return Estimate(np.asarray(radiance), (self.component(self.at(radiance)),))
 
 
+@dataclass(frozen=True, kw_only=True)
+class CalibrationSettings(MeasuringRange):
+    """What is stated of a calibration beside its numbers."""
+
+    warnings: Annotated[
+        tuple[str, ...],
+        Parameter("Warnings, as sentences; every measurement with this calibration repeats them."),
+    ] = ()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Calibration(MeasuringRange, ABC):
+class Calibration(CalibrationSettings, ABC):
     """Meaning of a camera's counts; `description` says what it is."""
 
     description: ClassVar[str]
@@ -85,8 +98,6 @@ class Calibration(MeasuringRange, ABC):
     """Lowest valid radiance temperature in K."""
     highest: float = inf
     """Radiance temperature in K up to which it holds."""
-    warnings: tuple[str, ...] = ()
-    """Warnings, as sentences."""
 
     @abstractmethod
     def radiance(self, counts: ArrayLike) -> Array:
@@ -154,7 +165,7 @@ class FittedCalibration(Calibration):
     @property
     def rises(self) -> bool:
         """Whether the counts rise with the temperature wherever it holds."""
-        kelvins = np.linspace(self.lowest, self.highest, _CHECKED)
+        kelvins = np.linspace(self.lowest, self.highest, _CHECKED_TEMPERATURES)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             return bool((self.slope(kelvins) > 0).all())
 
@@ -169,7 +180,7 @@ class FittedCalibration(Calibration):
     def errors(self) -> CalibrationErrors:
         """Effects of its errors on the radiance, from the coldest to the hottest blackbody."""
         coldest, hottest = self.counts([self.lowest, self.highest]).tolist()
-        kelvins = self.temperature(np.linspace(coldest, hottest, _NODES))
+        kelvins = self.temperature(np.linspace(coldest, hottest, _INVERSE_NODES))
         radiance = np.asarray(self.band.radiance(kelvins), np.float64)
         return CalibrationErrors(radiance, self._effects(kelvins))
 

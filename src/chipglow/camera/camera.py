@@ -8,7 +8,7 @@ import numpy as np
 
 from chipglow.camera import image, measuring
 from chipglow.camera.description import CameraDescription
-from chipglow.camera.exposure import Exposure, View, expose, sparse_frames
+from chipglow.camera.exposure import Exposure, SpectralView, expose, sparse_frames
 from chipglow.camera.exposure_kernels import Check
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics.image_formation import Gather
@@ -80,7 +80,7 @@ class Camera(CameraDescription):
         check: Check | None = None,
     ) -> tuple[Exposure, ...]:
         """Expose the camera to several surfaces from `prepare` in one pass; see `expose`."""
-        views = [View(field, self.band, self.reflected) for field in fields]
+        views = [SpectralView(field, self.band, self.reflected) for field in fields]
         delays = self.row_delays(scene.raster)
         return expose(scene, views, start, self.integration_time, delays, check)
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera.camera import Camera
 from chipglow.camera.effect import EVERY, Effect
-from chipglow.camera.exposure import Exposure, View, expose
+from chipglow.camera.exposure import Exposure, SpectralView, expose
 from chipglow.camera.exposure_kernels import Check
 from chipglow.camera.image import form_image, image_formation
 from chipglow.camera.measurement import range_flags
@@ -317,7 +317,7 @@ def expose_chains(
     """Expose chains of a scene in one pass; their cameras may differ in the band alone."""
     camera = chains[0].camera
     delays = camera.row_delays(chains[0].scene.raster)
-    views = [View(one.emissivity, one.camera.band, one.camera.reflected) for one in chains]
+    views = [SpectralView(one.emissivity, one.camera.band, one.camera.reflected) for one in chains]
     return expose(chains[0].scene, views, start, camera.integration_time, delays, check)
 
 
@@ -397,19 +397,19 @@ def _exposures(chain: Chain, seen: Exposure) -> Exposures:
     return Exposures(seen, *_in_one_pass(chain, _views(chain)[1:], seen.start))
 
 
-def _views(chain: Chain) -> list[View]:
+def _views(chain: Chain) -> list[SpectralView]:
     """Return the views of a chain's `Exposures`."""
     scene, band = chain.scene, chain.camera.band
     plain = _unreflecting(chain.surface)
     return [
-        View(chain.emissivity, band, chain.camera.reflected),
-        View(plain.prepare(scene, band), band),
-        View(UniformSurface(1.0).prepare(scene, band), band),
+        SpectralView(chain.emissivity, band, chain.camera.reflected),
+        SpectralView(plain.prepare(scene, band), band),
+        SpectralView(UniformSurface(1.0).prepare(scene, band), band),
     ]
 
 
 def _in_one_pass(
-    chain: Chain, views: Sequence[View], start: float, check: Check | None = None
+    chain: Chain, views: Sequence[SpectralView], start: float, check: Check | None = None
 ) -> tuple[Exposure, ...]:
     camera, scene = chain.camera, chain.scene
     delays = camera.row_delays(scene.raster)

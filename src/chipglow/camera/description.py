@@ -19,9 +19,10 @@ from chipglow.camera.optics.blurs import BLURS
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import sensor_raster
 from chipglow.camera.optics.terms import OPTICS_TERMS, OpticsTerm
-from chipglow.quantities import Array, Parameter, made_from
+from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, made_from
 from chipglow.quantities.units import LENGTH, TIME, Position
 from chipglow.radiometry import Band
+from chipglow.radiometry.band import PAPER_BAND
 from chipglow.scene import Raster
 
 _SUSPECT_LIMIT: Final = 373.15
@@ -85,7 +86,7 @@ class CameraDescription(CameraSettings):
     """All that is stated of a camera; `Camera` is one that measures."""
 
     band: Annotated[Band, Parameter("Spectral band; the paper's by default.")] = field(
-        default_factory=lambda: Band(3.8e-6, 5.1e-6)
+        default_factory=lambda: Band(*PAPER_BAND)
     )
     _: KW_ONLY
     shape: Annotated[
@@ -155,8 +156,8 @@ class CameraDescription(CameraSettings):
         ):
             warn(
                 f"camera: lower_limit is {self.lower_limit:g} K, which is "
-                f"{self.lower_limit - 273.15:g} °C. If {self.lower_limit:g} °C is meant, write "
-                f"{self.lower_limit + 273.15:g} K.",
+                f"{self.lower_limit - ZERO_CELSIUS:g} °C. If {self.lower_limit:g} °C is meant, "
+                f"write {self.lower_limit + ZERO_CELSIUS:g} K.",
                 ChipglowWarning,
                 stacklevel=3,
             )

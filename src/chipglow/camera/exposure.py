@@ -17,6 +17,8 @@ from chipglow.scene import Frame, Raster, Scene, is_gap
 from chipglow.surface import EmissivityField, EmissivityStack
 
 _ROUNDING: Final = 1e-6
+"""Part of a frame spacing or an exposure that counts as rounding of times."""
+
 _SPARSE: Final = 1e-3
 """Ratio of exposure to frame spacing below which a changing scene causes a warning."""
 
@@ -56,7 +58,7 @@ def surroundings_radiance(band: Band, reflected: float | None) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class SpectralView:
     """Emissivity of a scene in a band, with the temperature of the surroundings in K."""
 
     emissivity: EmissivityField
@@ -66,7 +68,7 @@ class View:
 
 def expose(
     scene: Scene,
-    views: Sequence[View],
+    views: Sequence[SpectralView],
     start: float,
     duration: float,
     delays: Array | None = None,

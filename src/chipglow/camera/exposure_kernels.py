@@ -33,9 +33,12 @@ _STRAIN, _RATE, _X, _Y = (
     SPLINE_FIELDS.index(name)
     for name in ("plastic_strain", "plastic_strain_rate", "material_x", "material_y")
 )
+
 _MEAN: Final = 3
+"""Position of the mean in the tuple that `Sums` passes to the kernels."""
+
 _VIEWS: Final = 10
-"""Positions of the mean and of the views in the tuple that `Sums` passes to the kernels."""
+"""Position of the views in this tuple."""
 
 Indices: TypeAlias = NDArray[np.intp]
 Check: TypeAlias = Callable[[], None]

@@ -7,7 +7,7 @@ import numpy as np
 
 from chipglow.camera.description import CameraDescription
 from chipglow.camera.detector.terms import EquivalentNoise, Lag, follows
-from chipglow.quantities import Array
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.scene import Raster
 
 BORDER_TOLERANCE: Final = 1.0
@@ -37,8 +37,8 @@ def rounding_warning(camera: CameraDescription, shape: tuple[int, int]) -> Itera
                 yield (
                     f"The stated NETD of {1e3 * term.netd:.3g} mK is not reached: rounding to "
                     f"{calibration.detector.bits} bits up to "
-                    f"{calibration.full_temperature - 273.15:.0f} °C causes "
-                    f"{1e3 * kelvins:.0f} mK at {term.temperature - 273.15:.4g} °C. NETD and "
+                    f"{calibration.full_temperature - ZERO_CELSIUS:.0f} °C causes "
+                    f"{1e3 * kelvins:.0f} mK at {term.temperature - ZERO_CELSIUS:.4g} °C. NETD and "
                     "range must be those of the same setting of the camera."
                 )
 

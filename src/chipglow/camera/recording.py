@@ -11,7 +11,7 @@ from chipglow.quantities.units import LENGTH, TIME
 from chipglow.radiometry import Band, ObjectParameters
 from chipglow.text import Notes
 
-Quantity: TypeAlias = Literal["counts", "radiance", "temperature"]
+SignalKind: TypeAlias = Literal["counts", "radiance", "temperature"]
 QUANTITIES: Final = ("counts", "radiance", "temperature")
 
 
@@ -86,7 +86,7 @@ class Recording(Brief, RecordingSettings):
 
     signal: NDArray[Any]
     """Frames, shape (time, y, x), of any real type; row 0 at the top."""
-    quantity: Quantity
+    quantity: SignalKind
     """Quantity of `signal`: counts, in-band radiance in W/(m² sr), or temperature in K as computed
     by the camera with its object parameters."""
     times: Array

@@ -21,14 +21,26 @@ from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 
 _MOST_FRAMES: Final = 64
+"""Most frames of a scene that are read for the metrics."""
+
 _FRAMES_A_BAND: Final = 2
-_TOUCHING: Final = 3e-6
+"""Frames from one that is searched for a shear band to the next."""
+
+_CONTACT_DISTANCE: Final = 3e-6
+"""Distance in m from the rake face up to which material is in contact."""
+
 _CHIP_OVER_FEED: Final = 1.2
+"""Height of a surface in feeds from which it is the chip's."""
+
 _UNDEFORMED: Final = 0.01
+"""Plastic strain below which material is undeformed."""
+
 _WHOLE: Final = 0.9
 """Fraction of a period at or above which a period counts as whole."""
 
 _DEVELOPED: Final = 0.5
+"""Strain rate of a developed band as a fraction of the largest."""
+
 _FORCES: Final = ("cutting_mean", "cutting_swing", "thrust_mean", "thrust_swing")
 """Metrics that a `CutHistory` states."""
 
@@ -148,8 +160,10 @@ def _measured(
 ) -> tuple[Array, float, float, float]:
     """Return the chip's thickness at the heights in m, its contact, feed and cutting speed."""
     solid = frame.material == Material.WORKPIECE
-    contact = contact_length(raster, solid, tool, _TOUCHING)
-    end = tool.rake_point(contact + 3 * raster.spacing) + _TOUCHING * np.array(tool.rake_normal)
+    contact = contact_length(raster, solid, tool, _CONTACT_DISTANCE)
+    end = tool.rake_point(contact + 3 * raster.spacing) + _CONTACT_DISTANCE * np.array(
+        tool.rake_normal
+    )
     return (
         _profile(solid, raster, tool, heights),
         contact if _inside(raster, end) else nan,

@@ -14,17 +14,39 @@ from chipglow.quantities import Array
 from chipglow.scene import Raster, Tool
 
 _RADIUS_STEP: Final = 2e-6
+"""Smallest step of the radius in m."""
+
 _STEPS_A_SAMPLE: Final = 3
 """Radii are 2 µm apart, or a third of a sample that is over 6 µm wide."""
+
 _ANGLES: Final = 401
+"""Angles of the polar grid."""
+
 _BELOW_HORIZONTAL: Final = radians(10.0)
+"""Angle in rad below the cutting direction to which a band may reach."""
+
 _STEEPEST: Final = 2.0
+"""Largest change of a path's direction: distance across over distance along the radius."""
+
 _STRAIGHTNESS: Final = 0.2
+"""Price of a path's slope, in units of the score."""
+
 _RAKE_LAYER: Final = 25e-6
+"""Thickness in m of the layer on the rake face, whose friction is no band."""
+
 _RAKE_LAYER_SHARE: Final = 0.4
+"""Thickness of this layer as a fraction of the radius, near the edge."""
+
 _TOLL: Final = 0.8
+"""Price of each step of a path, as a fraction of the median score, so that it ends where the band
+does."""
+
 _SMOOTHING: Final = 50e-6
+"""Length in m over which a curve is smoothed."""
+
 _WEAK: Final = 0.5
+"""Fraction of a path's median strength below which there is no ridge."""
+
 _NOWHERE: Final = np.int64(-1)
 
 

@@ -15,6 +15,7 @@ from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 
 _LONGEST_GAP: Final = 12e-6
+"""Longest gap in m within a contact."""
 
 
 class NoContactError(ValueError):

@@ -25,10 +25,19 @@ from chipglow.scene import Line, Raster, Tool, sample, straight_line
 BAND_RATE: Final = 6000.0
 """Plastic strain rate in 1/s under which the paper sees no shear band."""
 
-_GAP: Final = 15e-6
-_SEARCH: Final = 15e-6
+_LONGEST_GAP: Final = 15e-6
+"""Longest gap of a band in m."""
+
+_CLIMB_REACH: Final = 15e-6
+"""Distance in m to each side at which a point of the band looks for the maximum."""
+
 _CLIMB_BLUR: Final = (3.0, 1.5)
+"""Standard deviations of the Gaussian that smooths the profiles, in points along the band and in
+samples across."""
+
 _WIDEST: Final = 80e-6
+"""Largest half-width of a band in m."""
+
 _NO_RIDGE: Final = "shear band: no ridge of the plastic strain rate is off the rake face"
 
 
@@ -97,7 +106,7 @@ def find_shear_band(
     rate = np.where(workpiece, strain_rate, 0.0).astype(np.float64)
     path, reaches_surface = _best_path(raster, rate, workpiece, tool)
     points = even_steps(path, 2 * raster.spacing)
-    count = ceil(_SEARCH / raster.spacing)
+    count = ceil(_CLIMB_REACH / raster.spacing)
     offsets = raster.spacing * np.arange(-count, count + 1, dtype=np.float64)
     for _ in range(3):
         profiles = np.nan_to_num(sample(rate, raster, across_curve(points, offsets)))
@@ -131,7 +140,7 @@ def _best_path(
     score = np.log1p(np.maximum(values, 0.0) / BAND_RATE)
     score[polar.slopes_from_face(score)] = 0.0
     i, j = polar.best_path(score, allowed, ends, anywhere=True)
-    first = i[strongest_part(polar.points[i, j], score[i, j], _GAP).start]
+    first = i[strongest_part(polar.points[i, j], score[i, j], _LONGEST_GAP).start]
     if first > i[0]:
         # The path leads from one band to another: the band is the best path beyond the gap.
         beyond = allowed & (np.arange(len(allowed)) >= first)[:, None]

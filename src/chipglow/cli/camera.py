@@ -8,6 +8,7 @@ import typer
 
 from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
+from chipglow.quantities import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from chipglow.camera import FittedCalibration
@@ -113,8 +114,8 @@ def _print_fit(result: "BlackbodyCalibration", name: str) -> None:
     screen, fit = current(), result.fits[name]
     calibration = fit.calibration
     screen.heading(
-        f"\n{name}: {calibration.description}, {calibration.lowest - 273.15:.5g} °C to "
-        f"{calibration.highest - 273.15:.5g} °C"
+        f"\n{name}: {calibration.description}, {calibration.lowest - ZERO_CELSIUS:.5g} °C to "
+        f"{calibration.highest - ZERO_CELSIUS:.5g} °C"
     )
     parameters = result.parameter_frame().query("model == @name")
     screen.table("parameters", parameters, ["parameter", "value ± standard_uncertainty", "unit"])

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
+from chipglow.quantities import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from chipglow.camera import Measurement
@@ -78,7 +79,7 @@ def _print_squares(grid: "RakeGrid") -> None:
     over = f"between {grid.times.size} frames" if several else "over a square's pixels"
     squares, columns = {"along_um": 1e6 * grid.along}, {"along / µm": "along_um"}
     for n, depth in enumerate(1e6 * grid.depth):
-        squares[f"mean_degC_{n}"] = grid.frame_mean[n] - 273.15
+        squares[f"mean_degC_{n}"] = grid.frame_mean[n] - ZERO_CELSIUS
         squares[f"standard_deviation_K_{n}"] = grid.bars[n]
         squares[f"frames_{n}"] = grid.frame_count[n]
         columns[f"{depth:.4g} µm deep"] = f"mean_degC_{n} ± standard_deviation_K_{n}"

@@ -8,6 +8,7 @@ from chipglow.cli import options as opt
 from chipglow.cli.chip import chosen_frames
 from chipglow.cli.emissivity import doubts, emissivities_of
 from chipglow.cli.screen import current, figure, finish
+from chipglow.quantities import ZERO_CELSIUS
 
 _LARGEST_MISFIT: Final = 4.0
 """Misfit above which the residuals are more than twice the noise: not by chance."""
@@ -182,12 +183,21 @@ def _frames(measurement: "Measurement", frame: str) -> "Measurement":
 
 def _with_tool(measurement: "Measurement", tool: str | None) -> "tuple[Measurement, Notes, float]":
     """Return the measurement with the chosen tool, and its standard uncertainty in m if found."""
+    import numpy as np
+
     from chipglow.cli.tool_choice import chosen_tool
     from chipglow.text import Notes
 
     if tool is None:
         return measurement, Notes(), 0.0
     chosen, known, notes = chosen_tool(measurement, tool)
+    raster = measurement.raster
+    if (chosen.signed_distance(*np.meshgrid(raster.x, raster.y)) >= 0).all():
+        left, right, bottom, top = (1e6 * edge for edge in raster.extent)
+        raise ValueError(
+            f"--tool: {tool} is outside the image of x {left:.4g} to {right:.4g} um and "
+            f"y {bottom:.4g} to {top:.4g} um; give its place in these coordinates"
+        )
     return measurement.with_tool(chosen), notes, 0.0 if known is None else known.across
 
 
@@ -251,7 +261,6 @@ def _doubts(result: "Correction") -> "Notes":
 
 
 def _print(result: "Correction", frame: "pd.DataFrame") -> None:
-    from chipglow.quantities import ZERO_CELSIUS
 
     screen = current()
     columns = {

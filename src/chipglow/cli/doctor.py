@@ -26,8 +26,13 @@ _LEFT_OUT: Final = ("test", "dev", "docs", "import", "all")
 """Extras for developers, and those that only name others."""
 
 _BAND: Final = (3.8e-6, 5.1e-6)
+"""Limits in m of the band in which the radiance is checked: the paper's."""
+
 _TEMPERATURES: Final = (600.0, 1000.0, 1500.0)
+"""Temperatures in K at which the radiance is checked."""
+
 _TOLERANCE: Final = 1e-6
+"""Largest relative difference of a radiance from its integral by SciPy."""
 
 
 def examine() -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 from chipglow.cli import options as opt
 from chipglow.cli.batch import common_notes, for_each, load_measurements
 from chipglow.cli.screen import current, figure, finish
+from chipglow.quantities import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -92,7 +93,7 @@ def _print_tables(result: "lab.RegionEmissivities") -> None:
     columns += ["expanded_uncertainty", "coverage_factor"]
     parts = {"parts of u": "region"} | {cause: f"{cause}_uncertainty" for cause in BUDGET}
     for kelvins, rows in result.to_frame().groupby("reference_K", sort=False):
-        screen.heading(f"\nObject at {kelvins - 273.15:.6g} °C")
+        screen.heading(f"\nObject at {kelvins - ZERO_CELSIUS:.6g} °C")
         screen.table("regions", rows, columns)
         screen.heading()
         screen.table(None, rows, parts)
@@ -116,7 +117,7 @@ def _print_study(result: "lab.RegionEmissivities", out: Path | None) -> None:
         if out is not None and "chips" in text:
             text = lab.measured_text(out)
         else:
-            head += f" at {result.maps[0].heating.reference - 273.15:.6g} °C"
+            head += f" at {result.maps[0].heating.reference - ZERO_CELSIUS:.6g} °C"
     if text:
         current().heading(f"\n\n{head}:\n\n{text}")
         current().values({"study": text})
@@ -270,9 +271,9 @@ def _correct(
     frame["residual_K"] = [row.residual for row in rows]
     frame["residual_uncertainty_K"] = [row.residual_uncertainty for row in rows]
     shown = frame.assign(
-        corrected_temperature_degC=frame.corrected_temperature_K - 273.15,
-        corrected_low_degC=frame.corrected_low_K - 273.15,
-        corrected_high_degC=frame.corrected_high_K - 273.15,
+        corrected_temperature_degC=frame.corrected_temperature_K - ZERO_CELSIUS,
+        corrected_low_degC=frame.corrected_low_K - ZERO_CELSIUS,
+        corrected_high_degC=frame.corrected_high_K - ZERO_CELSIUS,
         correction_K=frame.corrected_temperature_K - frame.true_temperature_K,
     )
     columns = {
@@ -326,7 +327,7 @@ def _print(result: "lab.RegionTemperatures") -> None:
 
 def _celsius(rows: "pd.DataFrame") -> "pd.DataFrame":
     names = ("radiance_temperature", "true_temperature", "low", "high")
-    return rows.assign(**{f"{name}_degC": rows[f"{name}_K"] - 273.15 for name in names})
+    return rows.assign(**{f"{name}_degC": rows[f"{name}_K"] - ZERO_CELSIUS for name in names})
 
 
 _TEMPERATURES: Final = {

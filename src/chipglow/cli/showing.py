@@ -16,14 +16,19 @@ from chipglow.drawing.scales import shown_frame
 from chipglow.io import StoredScene, is_measurement, is_scene, open_scene, read_measurement
 from chipglow.io.measurement_file import holds
 from chipglow.laboratory.recordings import flag_fractions
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import ENERGY_UNITS, Raster, Tool, ToolGeometry
 from chipglow.text import Notes
 
 if TYPE_CHECKING:
     from chipglow.scene import SceneSummary
 
-_LONGEST: Final = 800
-_MOST: Final = 8
+_LONGEST_TEXT: Final = 800
+"""Characters of a text that are shown."""
+
+_LONGEST_LIST: Final = 8
+"""Items of a list that are shown."""
+
 _FLAG_NAMES: Final = {
     Flag.UNDER_RANGE: "below the lower range limit or the calibration",
     Flag.SATURATED: "saturated or above the calibration",
@@ -180,12 +185,16 @@ def _attribute_text(value: Any) -> str:
         parsed = None
     if isinstance(parsed, dict):
         leaves = pd.json_normalize(parsed).to_dict("records")[0]
-        long = {name: isinstance(one, list) and len(one) > _MOST for name, one in leaves.items()}
+        long = {
+            name: isinstance(one, list) and len(one) > _LONGEST_LIST for name, one in leaves.items()
+        }
         text = ", ".join(
             f"{name} [{len(leaf)} values]" if long[name] else f"{name} {leaf}"
             for name, leaf in leaves.items()
         )
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} … ({len(text)} characters)"
+    return (
+        text if len(text) <= _LONGEST_TEXT else f"{text[:_LONGEST_TEXT]} … ({len(text)} characters)"
+    )
 
 
 def microseconds(time: float) -> str:
@@ -200,10 +209,10 @@ def _measurement_facts(measurement: Measurement, time: float | None) -> _Rows:
     if "integration_time" in data.attrs:
         yield "integration time", microseconds(float(data.attrs["integration_time"]))
     if "lower_limit" in data.attrs:
-        yield "lower range limit", f"{float(data.attrs['lower_limit']) - 273.15:.4g} °C"
+        yield "lower range limit", f"{float(data.attrs['lower_limit']) - ZERO_CELSIUS:.4g} °C"
     if {"netd", "netd_temperature"} <= set(data.attrs):
         netd, at = (float(data.attrs[name]) for name in ("netd", "netd_temperature"))
-        yield "NETD", f"{1e3 * netd:.3g} mK at {at - 273.15:.4g} °C, half of the range filled"
+        yield "NETD", f"{1e3 * netd:.3g} mK at {at - ZERO_CELSIUS:.4g} °C, half of the range filled"
     if {"band_lower", "band_upper"} <= set(data.attrs):
         band, shape = measurement.band, ""
         if band.response is not None:
@@ -231,7 +240,7 @@ def _measurement_facts(measurement: Measurement, time: float | None) -> _Rows:
 
 
 def _celsius(kelvins: NDArray[np.float64]) -> str:
-    known = kelvins[np.isfinite(kelvins)] - 273.15
+    known = kelvins[np.isfinite(kelvins)] - ZERO_CELSIUS
     if known.size == 0:
         return "none: no pixel is usable"
     least, median, largest = (f"{one:.1f} °C" for one in np.quantile(known, (0.0, 0.5, 1.0)))

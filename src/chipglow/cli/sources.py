@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from chipglow.cli import options as opt
 from chipglow.cli.screen import current, finish
+from chipglow.quantities import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from chipglow.camera import Recording
@@ -88,7 +89,7 @@ def _convert_many(sources: list[Path], out: Path | None, settings: list[str], fo
         kelvins = measurement.radiance_temperature()
         known = kelvins[np.isfinite(kelvins)]
         least, median, largest = (
-            np.quantile(known, (0.0, 0.5, 1.0)) - 273.15 if known.size else np.full(3, np.nan)
+            np.quantile(known, (0.0, 0.5, 1.0)) - ZERO_CELSIUS if known.size else np.full(3, np.nan)
         )
         return {
             "file": str(source),
@@ -141,9 +142,9 @@ def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:
     stated = recording.object_parameters
     if stated is not None:
         yield "emissivity", f"{stated.emissivity:g}"
-        yield "reflected", f"{stated.reflected - 273.15:.2f} °C"
+        yield "reflected", f"{stated.reflected - ZERO_CELSIUS:.2f} °C"
         yield "transmittance", f"{stated.transmittance:g}"
-        yield "atmosphere", f"{stated.atmosphere - 273.15:.2f} °C"
+        yield "atmosphere", f"{stated.atmosphere - ZERO_CELSIUS:.2f} °C"
     for remark in recording.notes.remarks:
         yield "note", remark
 

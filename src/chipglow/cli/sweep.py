@@ -14,7 +14,10 @@ if TYPE_CHECKING:
     from chipglow.quantities import Quantity
 
 _MAX_ROWS: Final = 40
+"""Rows of a table that is shown on the screen."""
+
 _MAX_FAILURES: Final = 5
+"""Reasons of failed points that are shown."""
 
 _Vary: TypeAlias = Annotated[
     list[str],

@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 
 from chipglow.camera import Camera, Flag, Measurement, check_camera
 from chipglow.camera.image import image_formation
-from chipglow.correction.cells import Parts, cut_cells
+from chipglow.correction.cells import CELLS_PER_PIXEL, Parts, cut_cells
 from chipglow.correction.correction import Correction, CorrectionFlag, joined
 from chipglow.correction.noise import noise_of
 from chipglow.correction.posterior import Image, Posterior, Problem
@@ -52,7 +52,15 @@ _OUTLINE_FOUND: Final = 0.02
 _BORDER: Final = 3
 """Width in pixels of the border whose values depend on what is beyond the image."""
 
+_MARGIN: Final = 4
+"""Pixels beyond the image on each side whose radiance is unknown too.
+
+Their light reaches the image; within them the radiance continues as smoothly as in the image, and
+beyond them as that of their edge.
+"""
+
 _LEVEL: Final = 0.95
+"""Probability of the expanded uncertainties."""
 
 
 def correct(
@@ -202,8 +210,9 @@ def _corrected(
     progress: Callable[[float], None],
 ) -> _Frame:
     """Solve one frame, and propagate the uncertainties."""
-    image, notes = _image(measurement, frame, camera, noise)
-    pixels, fit, former = measurement.raster, None, None
+    inside, notes = _image(measurement, frame, camera, noise)
+    image, pixels = inside.extended(_MARGIN), _extended(measurement.raster)
+    fit, former = None, None
     if known.outline_uncertainty:
         known, fit, former = _located(image, camera, known, pixels, lambda: progress(0.0))
     problem = _problem(image, camera, known, pixels)
@@ -216,7 +225,7 @@ def _corrected(
         smoothing_effect(posterior, generator),
         Effect("smoothing", BIAS_FACTOR * bias[None]),
         *texture_effect(posterior, known, generator),
-        *systematic_effects(posterior, known, measurement, frame),
+        *systematic_effects(posterior, known, _calibration_images(measurement, frame)),
     ]
     if fit is not None:
         effects.append(outline_effect(posterior, known, fit))
@@ -225,13 +234,29 @@ def _corrected(
         posterior.problem.parts,
         posterior.x + bias,
         tuple(effects),
-        image,
+        inside,
         posterior.problem.parts.cells.spacing / np.sqrt(data),
         posterior.misfit,
         fit,
         known.observed.motion,
         notes,
     )
+
+
+def _extended(pixels: Raster) -> Raster:
+    """Return the raster with pixels without data around it."""
+    away, more = _MARGIN * pixels.spacing, 2 * _MARGIN
+    left, top = pixels.left - away, pixels.top + away
+    return Raster(left, top, pixels.spacing, pixels.rows + more, pixels.columns + more)
+
+
+def _calibration_images(measurement: Measurement, frame: int) -> list[Array]:
+    """Return changes of the image by errors of the calibration, zero beyond the image."""
+    errors = measurement.calibration_errors
+    if errors is None:
+        return []
+    changes = errors.at(np.nan_to_num(measurement.radiance[frame]))
+    return [np.pad(change, _MARGIN) for change in changes]
 
 
 def _added(one: Motion, other: Motion) -> Motion:
@@ -323,19 +348,22 @@ def _on_pixels(
     solved: _Frame, measurement: Measurement, frame: int, zones: Sequence[Zone]
 ) -> xr.Dataset:
     """Return temperatures, intervals and effects of one frame on the pixels."""
-    parts, band, shape = solved.parts, measurement.band, measurement.raster.shape
+    parts, band, shape = solved.parts, measurement.band, solved.parts.pixels.shape
     known = np.array([zone.emissivity is not None for zone in zones])
-    zone = _zone_of_pixels(parts, known, shape)
-    mean = _pixel_means(parts, zone.ravel())
+    zone_of_all = _zone_of_pixels(parts, known, shape)
+    mean, zone = _pixel_means(parts, zone_of_all.ravel()), _inside(zone_of_all)
     black = np.exp(parts.at_centroids @ solved.x)
-    radiance = (mean @ black).reshape(shape)
-    radiance = np.where(zone < 0, np.nan, radiance)
+
+    def on_pixels(values: Array) -> Array:
+        return _inside((mean @ values).reshape(shape))
+
+    radiance = np.where(zone < 0, np.nan, on_pixels(black))
     temperature = band.temperature(radiance)
     per_kelvin = np.asarray(band.slope(temperature))
     rows, sources, freedoms = [], [], []
     for effect in solved.effects:
         for change in effect.changes:
-            rows.append((mean @ (black * (parts.at_centroids @ change))).reshape(shape))
+            rows.append(on_pixels(black * (parts.at_centroids @ change)))
             sources.append(effect.source)
             freedoms.append(effect.degrees_of_freedom)
     relative = np.stack(rows) / radiance
@@ -357,7 +385,7 @@ def _on_pixels(
         "upper": (np.where(above, np.nan, upper), "K"),
         "flags": (flags, "1"),
         "zone": (zone.astype(np.int16), "1"),
-        "resolution": ((mean @ solved.resolution).reshape(shape), "m"),
+        "resolution": (on_pixels(solved.resolution), "m"),
     }
     variables: dict[str, tuple[Any, ...]] = {
         name: (("y", "x"), values, {"units": unit}) for name, (values, unit) in images.items()
@@ -366,7 +394,7 @@ def _on_pixels(
     variables["effect"] = ("error", "y", "x"), kelvins, {"units": "K"}
     variables["fine_temperature"] = (
         ("fine_y", "fine_x"),
-        _fine(parts, black, known, band),
+        _inside(_fine(parts, black, known, band), CELLS_PER_PIXEL),
         {"units": "K"},
     )
     variables["misfit"] = (), solved.misfit, {"units": "1"}
@@ -376,14 +404,21 @@ def _on_pixels(
     )
     variables["outline_motion"] = "motion", motion, {"units": "m, m, rad"}
     variables["outline_uncertainty"] = "motion", spread, {"units": "m, m, rad"}
+    own = slice(CELLS_PER_PIXEL * _MARGIN, -CELLS_PER_PIXEL * _MARGIN)
     coordinates = {
         "source": ("error", np.array(sources, dtype=str)),
         "degrees_of_freedom": ("error", np.array(freedoms)),
         "motion": ["right", "up", "turn"],
-        "fine_x": ("fine_x", parts.cells.x, {"units": "m"}),
-        "fine_y": ("fine_y", parts.cells.y, {"units": "m"}),
+        "fine_x": ("fine_x", parts.cells.x[own], {"units": "m"}),
+        "fine_y": ("fine_y", parts.cells.y[own], {"units": "m"}),
     }
     return xr.Dataset(variables, coordinates)
+
+
+def _inside(image: NDArray[Any], parts: int = 1) -> NDArray[Any]:
+    """Return the measured part of an extended image with `parts` values along a pixel."""
+    edge = slice(parts * _MARGIN, -parts * _MARGIN)
+    return image[edge, edge]
 
 
 def _zone_of_pixels(

@@ -6,6 +6,7 @@ from typing import Final
 
 from chipglow.correction.zones import Zone
 from chipglow.laboratory.emissivity import EmissivityLine
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Region, Tool
 
 TOOL: Final = "tool"
@@ -44,7 +45,8 @@ class KnownPart:
         if not 0 < float(value.values) <= 1:
             raise ValueError(
                 f"emissivity: that of {self.name!r} is {float(value.values):.3g} at "
-                f"{kelvins - 273.15:.0f} °C by its line over the temperature, expected over 0 to 1"
+                f"{kelvins - ZERO_CELSIUS:.0f} °C by its line over the temperature, expected over "
+                "0 to 1"
             )
         return Zone(
             self.name,

@@ -34,8 +34,9 @@ A kelvin changes an emissivity of 0.4 by 0.05 % (2e-4 1/K), and this a temperatu
 _LEAST: Final = 0.01
 """Least emissivity of a map: noise must not make it vanish."""
 
-_MARGIN: Final = 2
-"""Samples around a map to which its edge extends: outlines may move by as much."""
+_MARGIN: Final = 12
+"""Samples around a map to which its edge extends: the radiance beyond the image by four pixels is
+unknown too, and outlines may move."""
 
 _OUTSIDE: Final = "outside the map"
 _DARK: Final = Estimate(np.array(COLDEST))

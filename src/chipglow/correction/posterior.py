@@ -10,6 +10,7 @@ import numpy as np
 from numba import get_num_threads
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.ndimage import distance_transform_edt
 from scipy.sparse.linalg import splu
 
 from chipglow.camera import ImageFormation
@@ -27,11 +28,16 @@ _STEPS: Final = 2
 """Steps for each estimate of the weights, which a following one improves."""
 
 _STEP_TOLERANCE: Final = 3e-2
+"""Relative residual at which the solution of a step ends: a step is repeated."""
+
 _DRAW_TOLERANCE: Final = 1e-2
+"""Relative residual of a draw, far below the scatter of a standard deviation from a few draws."""
+
 _CHANGE_TOLERANCE: Final = 1e-3
 """Relative residuals of steps, which are repeated, of draws, and of changes by single errors."""
 
 _MOST_ITERATIONS: Final = 200
+"""Most iterations of conjugate gradients."""
 
 _BLURRED_WEIGHT: Final = 0.5
 """Weight of the data in the preconditioner, which has no blur: blur halves about this part."""
@@ -46,6 +52,7 @@ _ROUNDS: Final = 3
 """Rounds in which the weights of the prior follow from the solution and its uncertainty."""
 
 _DRAWS_PER_ROUND: Final = 3
+"""Draws from which the uncertainty in the weights of the prior follows, in each round."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +69,15 @@ class Image:
     """Saturated pixels: their radiance is at least the stated one."""
     missing: NDArray[np.bool_]
     """Pixels without data."""
+
+    def extended(self, margin: int) -> "Image":
+        """Return the image with pixels without data around it."""
+        radiance, noise = (np.pad(one, margin, mode="edge") for one in (self.radiance, self.noise))
+        under_range, lower_bound = (
+            np.pad(one, margin) for one in (self.under_range, self.lower_bound)
+        )
+        missing = np.pad(self.missing, margin, constant_values=True)
+        return Image(radiance, noise, under_range, lower_bound, missing)
 
     def weights(self, model: Array) -> Array:
         """Return the weights of the pixels, 0 where a bound holds or data are missing."""
@@ -132,15 +148,16 @@ class Problem:
             check()
             uncertain = ((self.curvature.matrix @ draws.T) ** 2).mean(axis=1)
             squares = (self.curvature.matrix @ posterior.x) ** 2 + uncertain
-            self._weigh(self.curvature.variances(squares, self.parts))
+            measured = ~self.image.missing.ravel()[self.parts.pixel]
+            self._weigh(self.curvature.variances(squares, self.parts, measured))
             posterior = self._maximum(posterior.x, check)
         return posterior
 
     def _start(self) -> Array:
         """Return the solution without blur: each cell has the radiance of its pixel."""
         parts, image = self.parts, self.image
-        own = np.where(image.missing, np.nan, image.radiance - self.reflected)
-        own = np.where(np.isnan(own), np.nanmedian(own), own)
+        nearest = distance_transform_edt(image.missing, return_distances=False, return_indices=True)
+        own = (image.radiance - self.reflected)[tuple(nearest)]
         mixed = np.bincount(parts.cell, self.shine, parts.cells.rows * parts.cells.columns)
         radiance = own.ravel()[parts.pixel] / mixed[parts.cell]
         least = 1e-3 * np.abs(np.median(radiance))
@@ -285,7 +302,10 @@ class Posterior:
         sent = self.sent / CELLS_PER_PIXEL**2
         entries = sent, (parts.pixel, np.arange(parts.size))
         image = sparse.csr_array(entries, shape=(self.pixel_weights.size, parts.size))
-        weights = _BLURRED_WEIGHT * self.pixel_weights.ravel()
+        # Pixels without data are seen by others, as far as the blur reaches.
+        cells = self.problem.formation.adjoint(np.sqrt(self.pixel_weights)).ravel()
+        reach = np.bincount(parts.pixel, parts.area * cells[parts.cell], self.pixel_weights.size)
+        weights = _BLURRED_WEIGHT * reach**2
         data = image.T @ sparse.diags_array(weights) @ image
         whole = sparse.csc_array(self.bending + data + _RIDGE * sparse.eye_array(parts.size))
         return splu(

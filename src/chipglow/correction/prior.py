@@ -24,6 +24,10 @@ _LEAST_VARIANCE: Final = 1e-12
 """Smallest variance of a curvature: 1e-6 of the radiance from cell to cell, far below noise."""
 
 
+_LEAST_WEIGHT: Final = 1e-3
+"""Least weight of a local mean, that of a value about six cells away."""
+
+
 @dataclass(frozen=True, eq=False)
 class Curvature:
     """Second differences of the parts' values within zones: along rows, columns and mixed.
@@ -52,19 +56,24 @@ class Curvature:
         middle = np.concatenate([members[0] for members, _ in rows])
         return cls(sparse.vstack(blocks).tocsr(), middle)
 
-    def variances(self, squares: Array, parts: Parts) -> Array:
+    def variances(self, squares: Array, parts: Parts, measured: NDArray[np.bool_]) -> Array:
         """Return the mean squares around each difference, within its zone.
 
         In the smoother half of each zone, the median of the zone counts: where there is no detail,
-        the data cannot show that there is less than that.
+        the data cannot show that there is less than that. It counts too where no part around is
+        `measured`: there, squares only repeat the present variances.
         """
         variance = np.empty(self.part.size)
-        zones = parts.zone[self.part]
+        zones, counted = parts.zone[self.part], measured[self.part].astype(np.float64)
         for zone in range(len(parts.index)):
             own = np.flatnonzero(zones == zone)
             if own.size:
-                around = local_mean(squares[own], parts.cell[self.part[own]], parts.cells.shape)
-                variance[own] = np.maximum(around, np.median(around))
+                cell, weights = parts.cell[self.part[own]], counted[own]
+                if not weights.any():
+                    weights = np.ones(own.size)
+                around = local_mean(squares[own], cell, parts.cells.shape, weights)
+                median = np.median(around[weights > 0])
+                variance[own] = np.maximum(around, median)
         return np.maximum(variance, _LEAST_VARIANCE)
 
 
@@ -81,12 +90,18 @@ def _sparse(members: NDArray[np.intp], weights: Array, parts: int) -> Any:
     return sparse.csr_array((values, (rows, members.ravel())), shape=(count, parts))
 
 
-def local_mean(values: Array, cell: NDArray[np.intp], shape: tuple[int, int]) -> Array:
-    """Return the mean of values in cells over a window around each."""
+def local_mean(
+    values: Array, cell: NDArray[np.intp], shape: tuple[int, int], weights: Array | None = None
+) -> Array:
+    """Return the weighted mean of values in cells over a window around each; 0 without weights."""
     size = shape[0] * shape[1]
+    weights = np.ones(cell.size) if weights is None else weights
     total, count = (
-        np.bincount(cell, weights, size).reshape(shape) for weights in (values, np.ones(cell.size))
+        np.bincount(cell, one, size).reshape(shape) for one in (weights * values, weights)
     )
     width = _NEIGHBOURHOOD / FWHM_PER_SIGMA
     around = [gaussian_filter(one, width, mode="constant") for one in (total, count)]
-    return np.asarray((around[0] / np.maximum(around[1], _LEAST_VARIANCE)).ravel()[cell])
+    mean = np.where(around[1] > _LEAST_WEIGHT, around[0], 0.0) / np.maximum(
+        around[1], _LEAST_WEIGHT
+    )
+    return np.asarray(mean.ravel()[cell])

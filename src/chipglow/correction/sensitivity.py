@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from chipglow.camera import ImageFormation, MeasuredPSF, Measurement, PointSpreadFunction
+from chipglow.camera import ImageFormation, MeasuredPSF, PointSpreadFunction
 from chipglow.camera.optics.psf import FWHM_PER_SIGMA
 from chipglow.correction.cells import Parts, cut_cells
 from chipglow.correction.posterior import Posterior
@@ -26,7 +26,7 @@ BIAS_FACTOR: Final = 2.0
 """Standard uncertainty of smoothing in units of the estimated bias of the solution.
 
 The bias is estimated from the solution itself, which is smoother than the truth. With this factor
-the intervals at outlines held 95 % on the scenes of ``benchmarks/correction.py`` for tuning.
+the intervals at known outlines held 95 % on 30 scenes for tuning of ``benchmarks/correction.py``.
 """
 
 _WIDTH_STEP: Final = 0.01
@@ -36,6 +36,7 @@ _OUTLINE_STEP: Final = 0.03
 """Displacement of the outlines in pixels for derivatives; cells are cut to 1/8192 of a pixel."""
 
 _PSF_DRAWS: Final = 6
+"""Draws of the point spread function within its uncertainty."""
 
 _LEAST_DATA: Final = 1e-4
 """Least number of data for a part: below it, a detail would be larger than 100 cells."""
@@ -90,13 +91,13 @@ def _drawn(source: str, posterior: Posterior, right_sides: list[Array]) -> Effec
 
 
 def systematic_effects(
-    posterior: Posterior, known: Knowledge, measurement: Measurement, frame: int
+    posterior: Posterior, known: Knowledge, calibration: list[Array]
 ) -> Iterator[Effect]:
     """Yield the effects of systematic errors: of emissivity, point spread function and others."""
     images = {
         "emissivity": list(_emissivity_images(posterior, known)),
         "psf": list(_psf_images(posterior, known)),
-        "calibration": _calibration_images(measurement, frame),
+        "calibration": calibration,
         "surroundings": list(_surroundings_images(posterior, known)),
         "border": [_border_image(posterior)],
         "range": _range_images(posterior),
@@ -183,13 +184,6 @@ def _image_with(posterior: Posterior, psf: PointSpreadFunction) -> Array:
     return formation.forward(posterior.light)
 
 
-def _calibration_images(measurement: Measurement, frame: int) -> list[Array]:
-    errors = measurement.calibration_errors
-    if errors is None:
-        return []
-    return list(errors.at(np.nan_to_num(measurement.radiance[frame])))
-
-
 def _surroundings_images(posterior: Posterior, known: Knowledge) -> Iterator[Array]:
     uncertainty = float(known.surroundings.standard_uncertainty)
     if uncertainty:
@@ -207,14 +201,14 @@ def _range_images(posterior: Posterior) -> list[Array]:
 def _border_image(posterior: Posterior) -> Array:
     """Return the standard uncertainty of the image by the radiance beyond it.
 
-    The solution takes it as constant beyond the edge, as cameras do. It may as well resemble the
-    surroundings of each pixel within the image; all values between are equally probable.
+    The solution takes it as constant beyond its margin. The error has a uniform distribution, as
+    wide as the difference from an image whose surroundings resemble what each pixel sees in it.
     """
     formation = posterior.problem.formation
     within = replace(formation, beyond="nothing")
     fraction = within.forward(np.ones(formation.samples.shape))
     similar = within.forward(posterior.light) / fraction
-    return np.asarray((similar - formation.forward(posterior.light)) / sqrt(3))
+    return np.asarray((similar - formation.forward(posterior.light)) / sqrt(12))
 
 
 @dataclass(frozen=True, eq=False)

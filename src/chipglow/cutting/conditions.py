@@ -71,7 +71,7 @@ class Friction(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0 <= self.conductance < 1e12:
+        if not 0 <= self.conductance < 1e12:  # more than any contact conducts, for a finite number
             raise ValueError(f"conductance: {self.conductance!r} W/(m2 K), expected 0 to 1e12")
 
 
@@ -198,6 +198,7 @@ class Numerics(Part):
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("upstream", "downstream", "depth", "height"):
+            # Splines at both borders need some cells; 0.1 m is beyond any cut's field of view.
             if not 8 * self.cell <= getattr(self, name) <= 0.1:
                 raise ValueError(f"{name}: {getattr(self, name)!r} m, expected 8 cells to 0.1 m")
 

@@ -22,6 +22,7 @@ BAND_LENGTHS: Final = 2.0
 """Width of that layer in lengths of a `NonlocalViscosity`."""
 
 _LARGEST_LOSS: Final = 0.99
+"""Largest drawn loss of strength: 1 would leave none."""
 
 
 @dataclass(frozen=True)

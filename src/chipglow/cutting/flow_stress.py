@@ -33,7 +33,9 @@ from chipglow.quantities import Family, Part
 FLOW_LAWS: Final = Family("flow_law")
 """Laws by their kind."""
 
-_DIFFERENCE: Final = 1e-6
+_RELATIVE_STEP: Final = 1e-6
+"""Relative step of strain and rate for the slopes of a law that states none."""
+
 _KERNELS: Final[dict[Any, Any]] = {}
 _OWN_LAWS: Final = count(1)
 
@@ -115,9 +117,9 @@ def _by_differences(stress: Callable[..., Any]) -> Any:
     def stress_and_slopes(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
         held = max(strain, 1e-9)
         here = law_stress(held, rate, temperature, law)
-        strained = law_stress(held * (1.0 + _DIFFERENCE), rate, temperature, law)
-        faster = law_stress(held, rate * (1.0 + _DIFFERENCE), temperature, law)
-        return here, (strained - here) / (held * _DIFFERENCE), (faster - here) / _DIFFERENCE
+        strained = law_stress(held * (1.0 + _RELATIVE_STEP), rate, temperature, law)
+        faster = law_stress(held, rate * (1.0 + _RELATIVE_STEP), temperature, law)
+        return here, (strained - here) / (held * _RELATIVE_STEP), (faster - here) / _RELATIVE_STEP
 
     return stress_and_slopes
 

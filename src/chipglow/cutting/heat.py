@@ -72,6 +72,7 @@ def nodes_around(p, grid):  # type: ignore[no-untyped-def]
 @njit
 def _slopes(offset):  # type: ignore[no-untyped-def]
     """Return the slopes of the weights of the three nodes, per cell."""
+    # derivatives of `spline_weights`
     return offset - 1.5, 2.0 * (1.0 - offset), offset - 0.5
 
 
@@ -151,10 +152,15 @@ need a needlessly short time step."""
 
 
 CELLS: Final = 24
+"""Cells of the tool beyond each border node; see `GROWTH`."""
+
 GROWTH: Final = 1.25
-"""Beyond the computed region the tool continues in a row of cells for each border node, each
-longer than the last: 840 cells of the grid out, 8.4 mm for cells of 10 µm. They conduct along the
-row only: heat that reaches a border far from the contact goes outward."""
+"""Ratio of the lengths of successive cells.
+
+Beyond the computed region the tool continues in a row of cells for each border node: 840 cells of
+the grid out, 8.4 mm for cells of 10 µm. They conduct along the row only: heat that reaches a border
+far from the contact goes outward.
+"""
 
 
 def border_nodes(fraction: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -16,6 +16,12 @@ _DRAG = replace(VISCOSITY, positive=False)  # may be 0
 MELTING_LIMIT = 3000.0
 """No metal that is cut melts above, in K."""
 
+_LEAST_STRENGTH = 0.01
+"""Fraction of the cold strength that a liquid keeps, so that points never lose all stiffness."""
+
+_LEAST_STRAIN = 1e-12
+"""Plastic strain from which on its logarithm is taken."""
+
 
 @njit(**INLINE)
 def homologous(temperature, law):  # type: ignore[no-untyped-def]
@@ -23,8 +29,7 @@ def homologous(temperature, law):  # type: ignore[no-untyped-def]
     theta = (temperature - law.reference_temperature) / (
         law.melting_temperature - law.reference_temperature
     )
-    # A liquid's strength is not zero: 1 % is left, so that points never lose all stiffness.
-    return min(max(theta, 0.0), 0.99)
+    return min(max(theta, 0.0), 1.0 - _LEAST_STRENGTH)
 
 
 @njit(**INLINE)
@@ -37,7 +42,7 @@ def _thermal(temperature, law):  # type: ignore[no-untyped-def]
 
 @njit(**INLINE)
 def _johnson_cook(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
-    held = max(strain, 1e-12)
+    held = max(strain, _LEAST_STRAIN)
     n, c = law.hardening_exponent, law.rate_sensitivity
     hardened = law.hardening * exponential(n * logarithm(held))
     ratio = rate / law.reference_rate
@@ -137,12 +142,12 @@ class MarusichOrtiz(FlowStress):
         heat = law.thermal_softening * (temperature - law.reference_temperature)
         hard = (1.0 + strain / law.reference_strain) ** (1.0 / law.hardening_exponent)
         fast = (1.0 + rate / law.reference_rate) ** (1.0 / law.rate_exponent)
-        return law.yield_stress * max(1.0 - heat, 0.01) * hard * fast
+        return law.yield_stress * max(1.0 - heat, _LEAST_STRENGTH) * hard * fast
 
 
 @njit(**INLINE)
 def _zerilli_armstrong(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
-    held = max(strain, 1e-12)
+    held = max(strain, _LEAST_STRAIN)
     n, by_rate = law.hardening_exponent, law.rate_hardening * temperature
     hardened = law.hardening * exponential(n * logarithm(held))
     faster = by_rate * logarithm(rate / law.reference_rate)

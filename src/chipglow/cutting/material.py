@@ -20,8 +20,14 @@ from chipglow.quantities.units import (
 )
 
 TABLE_COLDEST: Final = 200.0
+"""Temperature in K of the first row of sampled properties, the coldest that a workpiece may have.
+"""
+
 TABLE_HOTTEST: Final = 3000.0
+"""Temperature in K of their last row, at which no metal that is cut is solid."""
+
 ROOM_TEMPERATURE: Final = 293.15
+"""Temperature in K (20 °C) at which moduli and density of the points count."""
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,20 @@ from matplotlib.figure import Figure
 from chipglow.cutting.library import MaterialFile
 from chipglow.cutting.material import WorkpieceMaterial
 from chipglow.drawing.drawing import new_figure, style
-from chipglow.drawing.scales import BLUE, GREEN, KELVIN, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, VERMILLION
+from chipglow.quantities import ZERO_CELSIUS
 
 _TEMPERATURES: Final = ((20.0, BLUE), (400.0, GREEN), (800.0, VERMILLION))
+"""Temperatures of the curves in °C."""
+
 _RATES: Final = ((1.0, ":"), (1e3, "--"), (1e5, "-"))
+"""Plastic strain rates of the curves in 1/s."""
+
+_CURVE_POINTS: Final = 300
+"""Temperatures of a curve of a property."""
+
 _STRAINS: Final = np.linspace(0.0, 2.0, 81)
+"""Plastic strains of the curves."""
 
 
 def material_figure(material: MaterialFile) -> Figure:
@@ -36,10 +45,10 @@ def material_figure(material: MaterialFile) -> Figure:
 
 def _flow_stress_panel(axes: Axes, name: str, workpiece: WorkpieceMaterial) -> None:
     for celsius, colour in _TEMPERATURES:
-        if celsius + KELVIN >= workpiece.melting_temperature:
+        if celsius + ZERO_CELSIUS >= workpiece.melting_temperature:
             continue
         for rate, line in _RATES:
-            stress = workpiece.flow_stress.at(_STRAINS, rate, celsius + KELVIN) / 1e6
+            stress = workpiece.flow_stress.at(_STRAINS, rate, celsius + ZERO_CELSIUS) / 1e6
             label = f"{celsius:g} °C, {rate:.0e} 1/s"
             axes.plot(_STRAINS, stress, color=colour, linestyle=line, label=label)
     axes.set_title(f"Flow stress {name}, undamaged")
@@ -51,8 +60,8 @@ def _flow_stress_panel(axes: Axes, name: str, workpiece: WorkpieceMaterial) -> N
 
 def _temperature_panels(panels: Sequence[Axes], workpiece: WorkpieceMaterial) -> None:
     """Draw conductivity, heat capacity, elastic moduli and density over temperature."""
-    celsius = np.linspace(0.0, workpiece.melting_temperature - KELVIN, 300)
-    kelvins = celsius + KELVIN
+    celsius = np.linspace(0.0, workpiece.melting_temperature - ZERO_CELSIUS, _CURVE_POINTS)
+    kelvins = celsius + ZERO_CELSIUS
     left, middle, right, last = panels
     left.plot(celsius, workpiece.conductivity.at(kelvins), color=BLUE)
     left.set_ylabel("conductivity / W/(m K)")

@@ -57,7 +57,8 @@ on as in `EnergyHistory`; the last three are the elastic energy that goes when t
 share one dilation, that which comes when their volume without stress changes with the temperature,
 and that which goes when the moduli fall with it."""
 
-_RATE_OF_SLIDING = 1e4
+_SLIDING_RATE = 1e4
+"""Plastic strain rate in 1/s at which the flow stress limits the friction of undamaged material."""
 
 
 class Step(NamedTuple):
@@ -102,6 +103,7 @@ def spline(position):  # type: ignore[no-untyped-def]
 @njit(**INLINE)
 def spline_weights(offset):  # type: ignore[no-untyped-def]
     """Return the weights of the three nodes."""
+    # 3/4 − x² for |x| < 1/2 and (3/2 − |x|)²/2 beyond
     return 0.5 * (1.5 - offset) ** 2, 0.75 - (offset - 1.0) ** 2, 0.5 * (offset - 0.5) ** 2
 
 
@@ -176,7 +178,7 @@ def _contact(p, stress, tool, step, law):  # type: ignore[no-untyped-def]
     p.contact_time += step.time_step
     if push <= 0.0:
         return 0.0, 0.0, 0.0
-    strength = flow_stress(p.strain, _RATE_OF_SLIDING, p.temperature, law)
+    strength = flow_stress(p.strain, _SLIDING_RATE, p.temperature, law)
     strength = max(stress, strength)
     sticking = step.friction_factor * strength / np.sqrt(3.0) * step.area
     coefficient = friction_coefficient(

@@ -19,8 +19,12 @@ from chipglow.scene import Frame, Raster, Tool
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, Lattice, SplineFrame
 
 _FIELDS: Final = SPLINE_FIELDS[:FILLED_SPLINE]
+
 _CORRECTIONS: Final = 2
+"""Repetitions of the fit of splines to points, on its residuals."""
+
 _FILL_PASSES: Final = 3
+"""Nodes beyond the material to which values are extended: as many as a quadratic spline has."""
 
 
 class Picture:

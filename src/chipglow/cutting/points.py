@@ -134,6 +134,7 @@ def find_lost(points: Points, grid: Grid, ceiling: float) -> Trouble | None:
 def find_off_grid(points: Points, grid: Grid) -> Trouble:
     """Find the point for which a step was given up."""
     x, y = ((points[name] - edge) / grid.cell for name, edge in zip("xy", grid[:2], strict=True))
+    # A quadratic spline has the nodes from half a cell before a point to a cell and a half behind.
     inside: NDArray[np.bool_] = (x >= 0.5) & (x < grid.columns - 1.5)
     inside &= (y >= 0.5) & (y < grid.rows - 1.5)
     return "a point left the grid", int(inside.argmin())

@@ -14,8 +14,12 @@ from chipglow.cutting.stress import BULK, SHEAR, elastic_energy, kelvin_index
 from chipglow.quantities import Array, Brief
 from chipglow.scene import Frame, Raster
 
-_SMOOTH: Final = 5e-6
-_STANDS_OUT: Final = 0.05
+_SMOOTHING_TIME: Final = 5e-6
+"""Time in s over which the force is smoothed, less than a tenth of a segment's."""
+
+_VALLEY_DEPTH: Final = 0.05
+"""Rise on both sides of a valley, as a fraction of the mean force."""
+
 _APART: Final = 3
 """Intervals from one recorded part to the next, so that a scene shows a gap between them."""
 
@@ -45,7 +49,7 @@ class Valleys:
     """
 
     def __init__(self, interval: float) -> None:
-        self._length = max(1, round(_SMOOTH / interval))
+        self._length = max(1, round(_SMOOTHING_TIME / interval))
         self._values: list[float] = []
         self._total = 0.0
         self._rising = True
@@ -62,7 +66,7 @@ class Valleys:
         if count < self._length:
             return None
         smooth = sum(self._values[-self._length :]) / self._length
-        least = _STANDS_OUT * self._total / count
+        least = _VALLEY_DEPTH * self._total / count
         if self._rising:
             if smooth >= self._extreme:
                 self._extreme = smooth

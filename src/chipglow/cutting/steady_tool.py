@@ -23,7 +23,9 @@ from chipglow.quantities.units import LENGTH
 
 Field = NDArray[np.float64]
 
-_FACING: Final = 0.2
+_MIN_FACING: Final = 0.2
+"""Smallest cosine between the outward direction and a side of the grid: a side along the heat flow
+still conducts."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,7 @@ def _outward(grid: Grid, border: NDArray[np.int64], conductivity: Field, body: T
     sides = np.stack([(i == 0) | (i == grid.columns - 1), (j == 0) | (j == grid.rows - 1)])
     x, y = grid.axes
     along = np.abs(np.stack([x[i], y[j]])) / r
-    facing = np.maximum(np.where(sides, along, 0.0).max(axis=0), _FACING)
+    facing = np.maximum(np.where(sides, along, 0.0).max(axis=0), _MIN_FACING)
     slope = body.width / (r * (body.width + r))
     return np.asarray(conductivity[i, j] * facing * slope / body.fall(r))
 

@@ -24,7 +24,9 @@ _NODES: Final = types.float64[:, :, ::1]
 _THREE: Final = types.UniTuple(types.float64, 3)
 _AROUND: Final = (_NODES, types.int64, types.int64, _THREE, _THREE, _THREE, _THREE)
 _FUSE: Final = ("contract",)
-_ALIGNED_TO: Final = 8
+
+_ALIGNMENT: Final = 8
+"""Bytes to which a node's values are aligned: those of a double."""
 
 
 class _Vectors:
@@ -103,7 +105,7 @@ def sum_nodes(_context, nodes, i, j, wx, wy, dx, dy):  # type: ignore[no-untyped
         for a in range(3):
             column, column_by_y = vectors.zero, vectors.zero
             for b in range(3):
-                value = builder.load(places[a][b], align=_ALIGNED_TO)
+                value = builder.load(places[a][b], align=_ALIGNMENT)
                 column = vectors.add_product(column, weights[b], value)
                 column_by_y = vectors.add_product(column_by_y, slopes[b], value)
             weight, slope = wx[a], vectors.product(wx[a], dx[a])
@@ -144,10 +146,10 @@ def add_to_nodes(_context, nodes, i, j, wx, wy, dx, dy, level, by_x, by_y):  # t
             column = vectors.add_product(level, vectors.repeated(dx[a]), by_x)
             column, column_by_y = vectors.product(weight, column), vectors.product(weight, by_y)
             for b in range(3):
-                value = builder.load(places[a][b], align=_ALIGNED_TO)
+                value = builder.load(places[a][b], align=_ALIGNMENT)
                 value = vectors.add_product(value, weights[b], column)
                 value = vectors.add_product(value, slopes[b], column_by_y)
-                builder.store(value, places[a][b], align=_ALIGNED_TO)
+                builder.store(value, places[a][b], align=_ALIGNMENT)
         return context.get_dummy_value()
 
     return types.void(*_AROUND, level, by_x, by_y), write

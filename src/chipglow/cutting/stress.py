@@ -21,17 +21,26 @@ LANES = 128
 SLOWEST_RATE = 1.0
 """Plastic flow slower than this (1/s) is taken to be as strong as at this rate."""
 
-_ROW = LANES + 8
-_ITERATIONS = 8
+_ROW_LENGTH = LANES + 8
+"""Doubles of a row of the buffer: eight between two rows keep them out of the same cache sets."""
+
+_NEWTON_STEPS = 8
+"""Most steps of Newton's method."""
+
 _SMALL_CHANGE = 0.02
+"""Change of the logarithm of an increment below which it counts as found: the step that follows
+squares the error."""
+
 _SMALL_STRAIN = 0.01
+"""Plastic strain below which hardening is too steep to predict an increment."""
+
 _MOST_HELP = 0.95
 """Fraction of a point's strength that the flow around it takes off at most: it stays a solid."""
 (
     DXX, DYY, DXY, STRAIN, DAMAGE, TEMPERATURE, INCREMENT, VOLUME,
     CXX, CXY, CYX, CYY, TRIAL, WEAK, BOUND, WORK, SOFT, TENSION, FREE, EXPANSION, FALL, MEAN,
-) = range(0, 22 * _ROW, _ROW)  # fmt: skip
-BUFFER = 22 * _ROW
+) = range(0, 22 * _ROW_LENGTH, _ROW_LENGTH)  # fmt: skip
+BUFFER = 22 * _ROW_LENGTH
 STRESS = TRIAL
 """Rows of the buffer; in the end the trial stress has become the equivalent stress (Pa). `SOFT` is
 the shear modulus over that at room temperature; the deviator is that at room temperature. `FREE` is
@@ -71,7 +80,7 @@ def plastic_increments(b, count, shear_modulus, time_step, viscosity, law, damag
         b[BOUND + k] = bound
     if beyond == 0:
         return False
-    for _ in range(_ITERATIONS):
+    for _ in range(_NEWTON_STEPS):
         if _improve(b, count, shear_modulus, time_step, viscosity, law, damage) == 0:
             break
     return True

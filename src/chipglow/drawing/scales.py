@@ -18,8 +18,6 @@ PLAIN: Final = "cividis"
 RATE: Final = "viridis"
 SIGNED: Final = "RdBu_r"
 
-KELVIN: Final = 273.15
-
 
 def ends(
     image: NDArray[Any], low: float = 0.0, high: float = 100.0, least: float = 0.0

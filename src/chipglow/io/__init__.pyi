@@ -7,8 +7,8 @@ from .import_file import (
     load_import as load_import,
 )
 from .importing import (
+    FieldOfView as FieldOfView,
     Import as Import,
-    View as View,
     import_scene as import_scene,
     prospect as prospect,
     read_scene as read_scene,

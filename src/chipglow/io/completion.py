@@ -31,7 +31,10 @@ STRAIN_OF_CHIP: Final = 1.0
 _Corner: TypeAlias = tuple[Position, Position]
 _VELOCITY: Final = frozenset(("velocity_x", "velocity_y"))
 _CHIP_STARTS, _CHIP_ENDS = 0.3, 0.5
+
 _MOST_FILLED: Final = 0.5
+"""Fraction of filled samples above which it is a warning."""
+
 _FLOW_FRAMES: Final = 5
 """Number of frames over which the optical flow is computed: little moves from one to the next."""
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from chipglow.io.completion import Completion
-from chipglow.io.importing import Import, View
+from chipglow.io.importing import FieldOfView, Import
 from chipglow.io.measurement_file import holds
 from chipglow.io.sandbox import Isolated
 from chipglow.io.sources import Placement, Units
@@ -16,7 +16,7 @@ from chipglow.io.sources.meshes.vtk import OTHER_HDF
 from chipglow.io.sources.movies.movie import MovieSource
 from chipglow.io.sources.points.cloud import CloudSource
 from chipglow.io.tool_section import ToolSection
-from chipglow.quantities import Family, FileBeside, Parameter, Part, adapter
+from chipglow.quantities import ZERO_CELSIUS, Family, FileBeside, Parameter, Part, adapter
 from chipglow.quantities.units import TIME
 from chipglow.text import commented_yaml, described_by, has_names_of_columns
 
@@ -60,7 +60,9 @@ class ImportDescription(Part):
     placement: Annotated[Placement, Parameter("How the source's axes lie in the scene.")] = field(
         default_factory=Placement
     )
-    field_of_view: Annotated[View, Parameter("Samples of the scene.")] = field(default_factory=View)
+    field_of_view: Annotated[FieldOfView, Parameter("Samples of the scene.")] = field(
+        default_factory=FieldOfView
+    )
     tool: Annotated[
         ToolSection | None,
         Parameter("The tool's outline with its tip at the origin: what is in it is tool."),
@@ -129,7 +131,7 @@ class ImportDescription(Part):
         if self.tool is not None or self.movie.tool_colour is not None:
             assumptions["temperature"] = (
                 "Where the source has no temperature of the tool, it is "
-                f"{self.completion.surroundings - 273.15:g} °C (completion.surroundings)."
+                f"{self.completion.surroundings - ZERO_CELSIUS:g} °C (completion.surroundings)."
             )
         return assumptions
 

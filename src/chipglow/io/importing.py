@@ -31,11 +31,13 @@ MOST_SAMPLES: Final = 100_000_000
 """Most samples of a frame."""
 
 _CHECKPOINT_INTERVAL: Final = 30.0
+"""Seconds between the times at which an import is kept."""
+
 _KEY: Final = "import"
 
 
 @dataclass(frozen=True)
-class View(Part):
+class FieldOfView(Part):
     """Samples of the scene; by default as in the source."""
 
     left: Annotated[float | None, Parameter("Left edge.", POSITION)] = None
@@ -99,7 +101,7 @@ class Import:
     """A source and the description of its import."""
 
     source: Source
-    view: View = field(default_factory=View)
+    view: FieldOfView = field(default_factory=FieldOfView)
     completion: Completion = field(default_factory=Completion)
     description: Mapping[str, Any] = field(default_factory=dict)
     """How the source was described, kept with the scene: text and numbers."""

@@ -16,7 +16,8 @@ from chipglow.text import needs_extra
 PALETTE_SIZE: Final = 255
 """Most colours of a GIF: one more stands for what did not change."""
 
-_RATE: Final = 20
+_FRAME_RATE: Final = 20
+"""Frames per second of a movie."""
 
 
 def check_movie_path(path: str | os.PathLike[str]) -> None:
@@ -60,7 +61,7 @@ def _mp4(part: Path, shape: tuple[int, int]) -> Iterator[Callable[[NDArray[np.ui
     import av
 
     with av.open(str(part), "w", format="mp4") as container:
-        stream = container.add_stream("h264", rate=_RATE)
+        stream = container.add_stream("h264", rate=_FRAME_RATE)
         stream.options = {"preset": "veryfast"}
         stream.height, stream.width = shape
         stream.pix_fmt = "yuv420p"  # the one that every player knows
@@ -86,4 +87,6 @@ def _gif(part: Path, palette: NDArray[np.uint8]) -> Iterator[Callable[[NDArray[n
 
     yield append
     first, *others = pictures
-    first.save(part, "GIF", save_all=True, append_images=others, duration=1000 // _RATE, loop=0)
+    first.save(
+        part, "GIF", save_all=True, append_images=others, duration=1000 // _FRAME_RATE, loop=0
+    )

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 _REACH: Final = 8
+"""Samples within which the nearest known one is looked for."""
 
 
 def nearest(known: NDArray[np.bool_], wanted: NDArray[np.bool_]) -> tuple[NDArray[np.intp], ...]:

@@ -18,6 +18,7 @@ from chipglow.quantities.part import (
     made_from as made_from,
     of_other_packages as of_other_packages,
     problem as problem,
+    rederived as rederived,
     unchecked as unchecked,
 )
 from chipglow.quantities.quotient import quotient as quotient
@@ -25,6 +26,7 @@ from chipglow.quantities.settings import (
     Setting as Setting,
     changed as changed,
     own_settings as own_settings,
+    placed as placed,
     setting_at as setting_at,
     settings as settings,
     value_at as value_at,

@@ -43,11 +43,15 @@ from pydantic_core import CoreSchema, core_schema
 from typing_extensions import TypedDict
 
 from chipglow.quantities.parameter import Parameter
+from chipglow.quantities.units import is_number
 
 Class = TypeVar("Class", bound=type)
 PartType = TypeVar("PartType", bound="Part")
 
 
+# Not pydantic's own classes: a model takes no values by position, as Emissivity(0.4, 0.03), and its
+# copy keeps cached properties of other values; pydantic's dataclasses do not note what was given,
+# and call a field given by position 0 in errors.
 class Part:
     """A frozen dataclass whose fields declare their `Parameter`.
 
@@ -65,7 +69,9 @@ class Part:
     example : str
         How a description writes it, for the comment on the choice.
     given : frozenset of str
-        Fields that were given when it was made; the others have their defaults.
+        Fields that were given when it was made; the others have their defaults, or are derived.
+    derived : frozenset of str
+        Fields whose value follows from others, as they were not given.
 
     Raises
     ------
@@ -76,6 +82,7 @@ class Part:
     kind: ClassVar[str] = ""
     example: ClassVar[str] = ""
     given: frozenset[str]
+    derived: frozenset[str]
     _annotations: ClassVar[Mapping[str, Any]] = {}
     _parameters: ClassVar[Mapping[str, Parameter]] = {}
 
@@ -109,6 +116,7 @@ class Part:
         fields = getattr(cls, "__dataclass_fields__", {}).items()
         names = [name for name, one in fields if one.init and not one.kw_only]
         object.__setattr__(part, "given", frozenset([*names[: len(args)], *values]))
+        object.__setattr__(part, "derived", frozenset())
         return part
 
     def __post_init__(self) -> None:
@@ -120,7 +128,7 @@ class Part:
             if name in self.given and name not in (checked or ())
         }
         if reading is None:
-            stated |= self.completed(stated, False)
+            stated |= self.completed(stated)
         context = None if reading is None else reading.context
         try:
             values = _section(type(self)).validate_python(stated, context=context)
@@ -133,23 +141,18 @@ class Part:
         object.__setattr__(self, "given", self.given | values.keys())
 
     @classmethod
-    def completed(cls, data: Any, from_file: bool) -> Any:
-        """Return the section's data with what follows from them; numbers from a file need units."""
+    def completed(cls, data: Any) -> Any:
+        """Return the section's data with those to which its words refer, such as a preset's."""
         return data
 
-    @classmethod
-    def number(
-        cls, data: Mapping[str, Any], name: str, from_file: bool, default: float | None = None
-    ) -> float:
-        """Return the SI number of a field in a section's data, by default the field's default."""
-        if name not in data:
-            return getattr(cls, name) if default is None else default
-        quantity = cls.parameter(name).quantity
-        assert quantity is not None
-        try:
-            return quantity.parse(data[name], si=not from_file)
-        except ValueError as error:
-            raise ValueError(f"{name}: {error}") from None
+    def derive(self, **values: Any) -> None:
+        """Set fields that were not given; for `__post_init__`, when the given ones are known."""
+        for name in values.keys() - self.given:
+            value = values[name]
+            if is_number(value):
+                self.parameter(name).check(name, value)
+            object.__setattr__(self, name, value)
+            object.__setattr__(self, "derived", self.derived | {name})
 
     def stated(self) -> dict[str, Any]:
         """Return the fields that were given, by name, with the kind."""
@@ -186,8 +189,7 @@ class Part:
         def read(data: object, info: ValidationInfo) -> Part:
             if isinstance(data, cls):
                 return data
-            from_file = bool(info.context)
-            data = _known_keys(cls.completed({} if data is None else data, from_file), cls)
+            data = _known_keys(cls.completed({} if data is None else data), cls)
             _check_complete(data, cls)
             values = dict(data)
             if cls.kind and (kind := values.pop("kind", cls.kind)) != cls.kind:
@@ -235,9 +237,30 @@ def made_from(kind: type[PartType], checked: "Part", **values: Any) -> PartType:
 
 def unchecked(part: PartType, **values: Any) -> PartType:
     """Return a copy of a part with other values, which nothing checks."""
+    made = _copy(part, values)
+    object.__setattr__(made, "given", part.given | values.keys())
+    object.__setattr__(made, "derived", part.derived - values.keys())
+    return made
+
+
+def rederived(part: PartType, **values: Any) -> PartType:
+    """Return a copy of a part whose fields have these values if they were not given.
+
+    Fields that were derived before, and are not among them, have their defaults again.
+    """
+    defaults = part.defaults()
+    made = _copy(part, {name: defaults[name] for name in part.derived})
+    object.__setattr__(made, "given", part.given)
+    object.__setattr__(made, "derived", frozenset())
+    made.derive(**values)
+    return made
+
+
+def _copy(part: PartType, values: Mapping[str, Any]) -> PartType:
+    """Return a copy with other values, without cached properties."""
     made = object.__new__(type(part))
     kept = {one.name: getattr(part, one.name) for one in dataclass_fields(part)}
-    for name, value in {**kept, **values, "given": part.given | values.keys()}.items():
+    for name, value in {**kept, **values}.items():
         object.__setattr__(made, name, value)
     return made
 

@@ -105,28 +105,24 @@ def value_text(value: object, quantity: Quantity | None) -> str:
     return quantity.text(value) if quantity and isinstance(value, float) else f"{value}"
 
 
-def changed(
-    part: PartType, changes: Mapping[str, object], stated: Mapping[str, Any] | None = None
-) -> PartType:
-    """Return a copy with other values by their paths, all checked; a ValueError if impossible.
-
-    `stated` are the stated settings of the part, by default its own.
-    """
+def changed(part: PartType, changes: Mapping[str, object]) -> PartType:
+    """Return a copy with other values by their paths, all checked; a ValueError if impossible."""
+    for section in (path.rpartition(".")[0] for path in changes):
+        if section:
+            value_at(part, section)  # a LookupError if it does not exist
     try:
-        made: PartType = adapter(type(part)).validate_python(_with_changes(part, changes, stated))
+        made: PartType = adapter(type(part)).validate_python(placed(part, changes))
     except ValidationError as error:
         raise ValueError(problem(error)) from None
     return made
 
 
-def _with_changes(part: Any, changes: Mapping[str, object], stated: Any = None) -> Any:
-    """Return what was stated of a part, a mapping or a list, with the changes."""
-    if isinstance(part, Mapping):
-        data = dict(part)
-    elif isinstance(part, tuple):
-        data = {str(number): one for number, one in enumerate(part)}
-    else:
-        data = dict(stated) if isinstance(stated, Mapping) else part.stated()
+def placed(stated: Any, changes: Mapping[str, object]) -> Any:
+    """Return what a description states, with other values by their paths; sections may be new.
+
+    It is a part, or the mapping, the list or the value that a YAML file holds.
+    """
+    data = _entries(stated)
     inner: dict[str, dict[str, object]] = {}
     for path, value in changes.items():
         name, dot, rest = path.partition(".")
@@ -135,5 +131,19 @@ def _with_changes(part: Any, changes: Mapping[str, object], stated: Any = None) 
         else:
             data[name] = value
     for name, one in inner.items():
-        data[name] = _with_changes(value_at(part, name), one, data.get(name))
-    return tuple(data.values()) if isinstance(part, tuple) else data
+        default = getattr(stated, name) if isinstance(stated, Part) else None
+        data[name] = placed(data.get(name, default), one)
+    if not isinstance(stated, list | tuple):
+        return data
+    if list(data) != [str(number) for number in range(len(data))]:
+        raise ValueError(f"{', '.join(changes)}: expected a position in a list, from 0")
+    return type(stated)(data.values())
+
+
+def _entries(stated: Any) -> dict[str, Any]:
+    """Return the entries of a part, a mapping or a list by their names; none of all else."""
+    if isinstance(stated, Part):
+        return stated.stated()
+    if isinstance(stated, list | tuple):
+        return {str(number): one for number, one in enumerate(stated)}
+    return dict(stated) if isinstance(stated, Mapping) else {}

@@ -29,9 +29,15 @@ _QUANTITY: Final = re.compile(rf"\s*([-+−]?(?:{_FRACTION}|{_NUMBER}))\s*({_UNI
 _RANGE: Final = re.compile(rf"\s*({_NUMBER})\s*[-–]\s*({_NUMBER})\s*({_UNIT})?\s*")
 _MULTIPLE: Final = re.compile(rf"({_NUMBER})\s*\*?\s*([A-Za-z°µμ].*)")
 _BARE: Final = re.compile(rf"\s*[-+−]?(?:{_NUMBER})\s*")
+
 _MOST_DIGITS: Final = 21
+"""Digits up to which a rounded number is searched: more than a double has."""
+
 _LONGEST_NUMBER: Final = 12
+"""Characters of a number beyond which a fraction is tried instead."""
+
 _LARGEST_DENOMINATOR: Final = 99
+"""Largest denominator of such a fraction."""
 
 _SPELLINGS: Final = {
     "c": "degC",
@@ -95,12 +101,6 @@ def parse_unit(text: str, base: str, name: str) -> Unit:
         raise ValueError(f"unknown unit {text[:60]!r} of {name}, {expected}") from None
 
 
-class InSI(float):
-    """A number in SI units that follows from other settings, where a file must state a unit."""
-
-    __slots__ = ()
-
-
 @dataclass(frozen=True)
 class Quantity:
     """Kind and unit of a setting: an annotation of fields that read text and hold SI floats.
@@ -130,7 +130,7 @@ class Quantity:
 
     def parse(self, value: object, si: bool = False) -> float:
         """Return the SI number of a text such as ``10 us``; if `si`, also of an SI number."""
-        if isinstance(value, InSI) or (si and is_number(value)):
+        if si and is_number(value):
             return self._checked(f"{value} {self.base}", float(value))
         if is_bare_number(value):
             raise ValueError(f"{value} has no unit, {self.expected}")
@@ -243,6 +243,8 @@ def is_number(value: object) -> TypeGuard[float]:
 
 
 COLDEST: Final = 200.0
+"""Lowest temperature in K of fields, and of the tables of radiance."""
+
 HOTTEST: Final = 6000.0
 """Limits in K of the temperatures of scenes, black bodies and radiance tables."""
 

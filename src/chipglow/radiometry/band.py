@@ -27,15 +27,24 @@ SECOND_RADIATION_CONSTANT: Final = 1.438776877503933e-2
 Response: TypeAlias = Callable[[Array], Array]
 """Relative spectral response of a camera: wavelengths in m to values of 0 or more."""
 
+PAPER_BAND: Final = (3.8e-6, 5.1e-6)
+"""Limits in m of the spectral band of the paper's camera, the default of cameras and surfaces."""
+
 _NODES_PER_PANEL: Final = 16
+"""Gauss nodes of each panel of an integral over wavelength."""
+
 _TEMPERATURE_STEP: Final = 0.25
+"""Step in K of the table of radiances."""
+
 _SHIFT: Final = 46
 """Low bits of a radiance that lie between two nodes of the inverse: 64 nodes to a power of two."""
 
 _POWERS: Final = 128
 """Powers of two below the largest radiance that the inverse's table covers at most."""
 
-_BLOCK: Final = 1024
+_BLOCK_VALUES: Final = 1024
+"""Temperatures computed at once, which stay in the cache."""
+
 _KERNEL: Final[Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
@@ -257,8 +266,8 @@ class Band:
         """Return in-band radiance, and its derivative in W/(m² sr K)."""
         wavelength, weights = self._quadrature
         radiance, slope = np.empty_like(temperature), np.empty_like(temperature)
-        for at in range(0, temperature.size, _BLOCK):
-            part = slice(at, at + _BLOCK)
+        for at in range(0, temperature.size, _BLOCK_VALUES):
+            part = slice(at, at + _BLOCK_VALUES)
             kelvins = temperature[part, None]
             spectral = spectral_radiance(wavelength, kelvins)
             radiance[part] = spectral @ weights
@@ -319,10 +328,10 @@ def _look_up_radiance(temperature, table, radiance):
 @njit(**_KERNEL)
 def _look_up_temperature(radiance, first, cubics, temperature):
     """Fill in temperatures, NaN where the table has none; return how many are NaN."""
-    block = np.empty(_BLOCK)
+    block = np.empty(_BLOCK_VALUES)
     missing = 0
-    for begin in range(0, radiance.size, _BLOCK):
-        count = min(_BLOCK, radiance.size - begin)
+    for begin in range(0, radiance.size, _BLOCK_VALUES):
+        count = min(_BLOCK_VALUES, radiance.size - begin)
         block[:count] = radiance[begin : begin + count]
         # The bits of a positive number are in the order of the numbers.
         for i, bits in enumerate(block[:count].view(np.int64)):

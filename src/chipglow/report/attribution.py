@@ -20,6 +20,7 @@ _LEAST: Final = 0.5
 """Contribution in K below which a sentence and the maps leave an effect out."""
 
 _MAX_SENTENCES: Final = 3
+"""Sentences of an answer; the tables hold all errors."""
 
 
 def attribution_sentence(data: xr.Dataset, x: float, y: float) -> str:

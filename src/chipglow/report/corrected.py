@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from chipglow.analysis import CorrectedPlace, CorrectedWindow
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
-from chipglow.quantities import Array
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.report.facts import Facts
 from chipglow.report.page import texts
 from chipglow.report.rows import Row, slug
@@ -43,7 +43,13 @@ def sentences(facts: Facts, rows: Mapping[str, Row]) -> Iterator[str]:
     for window in windows:
         cells = _cells(rows, slug(window.surface), "rms_K")
         held = rows[f"{slug(window.surface)}_held_percent"].cells["mean"]
-        yield facts.text(words["window"], surface=window.surface, held=held, **cells)
+        yield facts.text(
+            words["window"],
+            surface=window.surface,
+            held=held,
+            uncertainty=window.emissivity_uncertainty,
+            **cells,
+        )
 
 
 def _cells(rows: Mapping[str, Row], start: str, end: str) -> dict[str, str]:
@@ -72,9 +78,9 @@ def images(facts: Facts) -> Figure | None:
 
 def _panels(window: CorrectedWindow) -> Iterator[ImagePanel]:
     data = window.correction.data.isel(time=0)
-    corrected = data["temperature"].values - KELVIN
+    corrected = data["temperature"].values - ZERO_CELSIUS
     measured = window.measurement.celsius(0)
-    true = np.where(np.isnan(corrected), np.nan, window.true - KELVIN)
+    true = np.where(np.isnan(corrected), np.nan, window.true - ZERO_CELSIUS)
     half = (data["upper"].values - data["lower"].values) / 2
     heat = scales.ends(np.concatenate([measured, corrected, true]), 0.5, 99.5)
     known = half[np.isfinite(half)]
@@ -103,10 +109,10 @@ def curves(facts: Facts) -> Figure | None:
         data = window.correction.data.isel(time=0)
         at, measured = 1e6 * place.distance, window.measurement.celsius(0)
         corrected, lower, upper = (
-            data[name].values - KELVIN for name in ("temperature", "lower", "upper")
+            data[name].values - ZERO_CELSIUS for name in ("temperature", "lower", "upper")
         )
         axes.fill_between(at, _along(place, lower), _along(place, upper), color=BLUE, alpha=0.2)
-        axes.plot(at, _along(place, window.true - KELVIN), color=GREY, label="true")
+        axes.plot(at, _along(place, window.true - ZERO_CELSIUS), color=GREY, label="true")
         axes.plot(at, _along(place, corrected), color=BLUE, label="corrected, 95 % interval")
         axes.plot(at, _along(place, measured), color=VERMILLION, label="measured")
         axes.set(title=f"{place.name}, {place.surface}", xlabel="distance / µm")

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from chipglow.analysis import Analysis
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
 from chipglow.laboratory.chip import RakeGrid, rake_grid
 from chipglow.laboratory.chip.figure import draw_rake_profiles
 from chipglow.laboratory.emissivity.figure import draw_heated
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.report.facts import Facts
 from chipglow.scene import Frame, Material, Raster
 from chipglow.scene.figures import draw_chip, image_figure, show_image
@@ -31,7 +32,7 @@ def heated_chips(facts: Facts) -> Figure | None:
     figure = drawing.new_figure(2.6)
     panels = figure.subplots(1, len(chips), squeeze=False)[0]
     for letter, axes, heated in zip("abcdefgh", panels, chips, strict=False):
-        truth = heated.map.heating.reference - KELVIN
+        truth = heated.map.heating.reference - ZERO_CELSIUS
         title = f"{letter}) {heated.name}, at {truth:.0f} °C"
         draw_heated(figure, axes, heated.map, heated.regions, title)
     drawing.legend(figure, 2)
@@ -46,7 +47,7 @@ def heated_tool(facts: Facts) -> Figure | None:
     found, raster, tool = tools[0], tools[0].map.raster, facts.cut.segments[0].tool
     figure = drawing.new_figure(2.9)
     left, right = figure.subplots(1, 2)
-    title = f"a) tool, at {found.map.heating.reference - KELVIN:.0f} °C"
+    title = f"a) tool, at {found.map.heating.reference - ZERO_CELSIUS:.0f} °C"
     draw_heated(figure, left, found.map, (), title, tool)
     inside = tool.signed_distance(*np.meshgrid(raster.x, raster.y)) < -3 * raster.spacing
     right.hist(found.map.emissivity[inside], bins=40, color=BLUE, density=True)
@@ -89,11 +90,11 @@ def dual_spectrum(facts: Facts) -> Figure:
     """Draw a grey picture and the infrared image of the same moments."""
     analysis, cut = facts.analysis, facts.cut
     name, tool, rows = analysis.data.attrs["band_surface"], cut.segments[0].tool, len(cut.moments)
-    images = analysis.data.radiance_temperature.sel(surface=name).values - KELVIN
+    images = analysis.data.radiance_temperature.sel(surface=name).values - ZERO_CELSIUS
     starts = analysis.data.instant.values[: facts.starts]
     figure = image_figure(analysis.raster, 2.3, rows=rows)
     grid = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
-    low = (analysis.camera.lower_limit or KELVIN + 100.0) - KELVIN
+    low = (analysis.camera.lower_limit or ZERO_CELSIUS + 100.0) - ZERO_CELSIUS
     heat = (low, max(scales.round_limit(images[np.isfinite(images)], 99.9, 50.0), low + 50.0))
     pixels = analysis.measurements[name].raster
     for (left, right), frame in zip(grid, cut.moments, strict=True):
@@ -119,7 +120,7 @@ def band_curves(facts: Facts) -> Figure:
     shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.88, facts.starts))
     after = (data.instant.values - data.instant.values[0]) * 1e6
     for axes, name in zip(panels, data.surface.values, strict=True):
-        curves = data.ridge_radiance_temperature.sel(surface=name).values - KELVIN
+        curves = data.ridge_radiance_temperature.sel(surface=name).values - ZERO_CELSIUS
         for i in range(facts.starts):
             axes.plot(
                 data.ridge_distance.values[i] * 1e6,
@@ -129,7 +130,7 @@ def band_curves(facts: Facts) -> Figure:
                 label=f"{after[i]:.0f} µs" + (" (full)" if i == shown else ""),
             )
         if facts.analysis.camera.lower_limit is not None:
-            limit = facts.analysis.camera.lower_limit - KELVIN
+            limit = facts.analysis.camera.lower_limit - ZERO_CELSIUS
             axes.axhline(limit, color=GREY, linestyle="--", linewidth=1.0)
         axes.set(title=name, xlabel="distance along the band / µm")
     panels[0].set_ylabel("radiance temperature / °C")

@@ -18,7 +18,7 @@ from chipglow.analysis import (
 )
 from chipglow.camera import FlatFieldCalibration
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.scales import KELVIN
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.report.page import template, texts
 from chipglow.report.quoted import Quoted
 
@@ -100,9 +100,9 @@ class Facts:
         if psf is not None:
             blur = f"{psf}, {1e6 * psf.fwhm:.3g} µm wide at half maximum, {order}"
         bits = camera.detector.bits if camera.detector else None
-        lowest = "no lower limit" if limit is None else f"from {limit - KELVIN:.0f} °C"
+        lowest = "no lower limit" if limit is None else f"from {limit - ZERO_CELSIUS:.0f} °C"
         calibration = self.calibration
-        highest = f" to {calibration.full_temperature - KELVIN:.0f} °C" if calibration else ""
+        highest = f" to {calibration.full_temperature - ZERO_CELSIUS:.0f} °C" if calibration else ""
         reflected = camera.reflected
         settings = {
             "Spectral band": spectral,
@@ -111,7 +111,7 @@ class Facts:
             "Point spread function": blur,
             "Range": f"{lowest}{highest}",
             "Reflected temperature": (
-                "none" if reflected is None else f"{reflected - KELVIN:.0f} °C"
+                "none" if reflected is None else f"{reflected - ZERO_CELSIUS:.0f} °C"
             ),
             "Detector": "ideal" if bits is None else f"{bits} bits, with noise",
         }
@@ -128,7 +128,7 @@ class Facts:
         """Return ends of a scale of temperatures, the lower near the camera's lower limit."""
         low, high = scales.ends(celsius, 0.5, 99.9, 1.0)
         limit = self.analysis.camera.lower_limit
-        low = low if limit is None else max(limit - KELVIN - 50.0, low)
+        low = low if limit is None else max(limit - ZERO_CELSIUS - 50.0, low)
         return low, max(high, low + 50.0)
 
     def series(self, reading: str, unit: str) -> Array | None:

@@ -21,7 +21,8 @@ from chipglow.analysis import (
 )
 from chipglow.analysis.figure import draw_error, draw_marks, error_limit
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.report.facts import Facts
 from chipglow.report.paper import PAPER
 from chipglow.report.rows import MAIN, main_readings
@@ -45,6 +46,8 @@ _ORDERS: Final = {
 _Series: TypeAlias = Callable[[xr.Dataset, str, str], Array]
 
 _MAX_CURVES: Final = 6
+"""Curves of a figure, beyond which they cannot be distinguished."""
+
 _LINE_TITLES: Final = {
     "rake": "across the rake face",
     "contact": "along the contact",
@@ -109,8 +112,8 @@ def measurement(facts: Facts) -> Figure:
     rows = figure.subplots(len(names), 2, sharex=True, sharey=True, squeeze=False)
     shown = facts.data.isel(instant=facts.data.attrs["shown_instant"])
     for axes, name in zip(rows, names, strict=True):
-        truth = shown.scene_radiance_temperature.sel(surface=name).values - KELVIN
-        measured = shown.radiance_temperature.sel(surface=name).values - KELVIN
+        truth = shown.scene_radiance_temperature.sel(surface=name).values - ZERO_CELSIUS
+        measured = shown.radiance_temperature.sel(surface=name).values - ZERO_CELSIUS
         limits = facts.heat_limits(truth)
         pixels = analysis.measurements[name].raster
         show_image(axes[0], truth, analysis.raster, analysis.tool, scales.HEAT, limits)
@@ -127,8 +130,8 @@ def exposure(facts: Facts) -> Figure:
     """Draw reference, measurement and error of the shown exposure, and where errors are read."""
     analysis, names = facts.analysis, facts.read_surfaces
     shown = facts.data.isel(instant=facts.data.attrs["shown_instant"]).sel(surface=names)
-    reference = shown.reference_temperature - KELVIN
-    measured = shown.radiance_temperature - KELVIN
+    reference = shown.reference_temperature - ZERO_CELSIUS
+    measured = shown.radiance_temperature - ZERO_CELSIUS
     error = measured - reference
     heat = facts.heat_limits(reference.values)
     largest = scales.round_limit(error.values, 99.0, 10.0)
@@ -187,7 +190,7 @@ def error_lines(facts: Facts) -> Figure | None:
     for (left, right), name in zip(rows, names, strict=True):
         error, portion = line_error(facts.data, name), line_psf_portion(facts.data, name)
         known = {dim: slice(error.sizes[dim]) for dim in ("texture", "point")}
-        reference = facts.data.line_reference.sel(line=name).isel(known) - KELVIN
+        reference = facts.data.line_reference.sel(line=name).isel(known) - ZERO_CELSIUS
         at = error.distance.values * factor
         for axes, values, colour, label in (
             (left, reference, GREY, "reference"),

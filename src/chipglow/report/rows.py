@@ -12,7 +12,7 @@ import pandas as pd
 from chipglow.analysis import Analysis, Cut, Distribution, Headline, one_draw
 from chipglow.analysis.distribution import student_factor
 from chipglow.chip import Segment
-from chipglow.drawing.scales import KELVIN
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.quantities.format import quantity_text
 from chipglow.report import numbers, paper
 from chipglow.report.facts import Facts
@@ -245,7 +245,7 @@ def _reading(facts: Facts, name: str) -> Iterator[Row]:
         error = _drawn(facts, name, "error_degC", None, one.error)
         yield replace(error, explanation=texts()["unread"])
     else:
-        celsius = found.reference.having(found.reference.values - KELVIN)
+        celsius = found.reference.having(found.reference.values - ZERO_CELSIUS)
         parts = _parts(facts, name, found) if is_main else {}
         more: Any = {"reference": celsius, "parts": parts}
         yield _drawn(facts, name, "error_degC", found.error, one.error, **more)

@@ -6,7 +6,7 @@ from math import degrees
 from types import MappingProxyType
 from typing import Final
 
-from chipglow.drawing.scales import KELVIN
+from chipglow.quantities import ZERO_CELSIUS
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ SHOWN_UNITS: Final[Mapping[str, ShownUnit]] = MappingProxyType(
         "N/mm": ShownUnit(per_si=1e-3),
         "°": ShownUnit(per_si=degrees(1.0)),
         "K": ShownUnit(),
-        "°C": ShownUnit(zero=KELVIN),
+        "°C": ShownUnit(zero=ZERO_CELSIUS),
     }
 )
 """By the text of the unit."""

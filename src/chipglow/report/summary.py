@@ -51,7 +51,7 @@ class Scatter(_Numbered):
         )
 
 
-class Cause(_Numbered):
+class CauseScatter(_Numbered):
     """Contribution of one cause to the scatter of a number."""
 
     count: Annotated[int, Field(ge=1)]
@@ -84,7 +84,7 @@ class Summary(_Numbered):
     """Mean reading of a camera without error, of each error."""
     draws: dict[str, Scatter]
     """Scatter of the results."""
-    causes: dict[str, dict[str, Cause]]
+    causes: dict[str, dict[str, CauseScatter]]
     """Causes of the scatter of the results."""
     parts: dict[str, dict[str, Mean]]
     """Contributions to the errors: psf, motion and footprint, or psf and rest."""
@@ -159,9 +159,9 @@ def _uncertainties(rows: Sequence[Row]) -> dict[str, float]:
     return {row.key: row.uncertainty for row in rows if row.uncertainty is not None}
 
 
-def _causes(draws: Distribution) -> dict[str, Cause]:
+def _causes(draws: Distribution) -> dict[str, CauseScatter]:
     return {
-        name: Cause(
+        name: CauseScatter(
             count=part.draws,
             standard_deviation=known(part.standard_deviation),
             fraction_percent=100 * part.fraction,

@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 
 SPEED: Final = "speed"
 """Title of the panel of the speed."""
+
 _LARGEST_IN_MICRONS: Final = 5e-3
+"""Length in m from which axes are in millimetres."""
+
 _DECADES: Final = 3
 """Decades of a scale of strain rates."""
 

@@ -36,6 +36,7 @@ the source gives numbers); `FILLED`: the source shows nothing there, the value i
 """
 
 FILLED: Final = 255
+"""Quality of a sample without a value in its source."""
 
 
 class Material(IntEnum):

@@ -14,8 +14,11 @@ from chipglow.scene.raster import Raster
 Point: TypeAlias = tuple[float, float]
 """Column and row in pixels from the image's upper left corner, or x and y in m."""
 
-_ROUND: Final = 72
-_BEYOND: Final = 1e-6
+_CIRCLE_POINTS: Final = 72
+"""Points of a circle's outline."""
+
+_ROUNDING: Final = 1e-6
+"""Part of a pixel by which a place may be beyond the image by rounding."""
 
 
 def in_polygon(corners: Sequence[Point], x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
@@ -73,7 +76,7 @@ class Circle:
     @property
     def outline(self) -> NDArray[np.float64]:
         """Points along its edge, shape (n, 2)."""
-        angle = np.linspace(0.0, 2 * np.pi, _ROUND, endpoint=False)
+        angle = np.linspace(0.0, 2 * np.pi, _CIRCLE_POINTS, endpoint=False)
         directions = np.stack([np.cos(angle), np.sin(angle)], axis=1)
         return np.asarray(self.centre, np.float64) + self.radius * directions
 
@@ -125,7 +128,7 @@ class Region:
         for name, place, count in zip(
             ("columns", "rows"), places.T, (raster.columns, raster.rows), strict=True
         ):
-            if place.min() < -_BEYOND or place.max() > count + _BEYOND:
+            if place.min() < -_ROUNDING or place.max() > count + _ROUNDING:
                 raise ValueError(
                     f"region {self.name}: reaches over {name} {place.min():.4g} to "
                     f"{place.max():.4g}, expected within the image's 0 to {count}"

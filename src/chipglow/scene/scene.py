@@ -60,6 +60,7 @@ ENERGY_UNITS: Final[Mapping[str, str]] = dict.fromkeys(
 """Energy account on `force_time`, per width of cut and since the start: optional, all or none."""
 
 _LONGEST_STEP: Final = 2.0
+"""Time between frames, in the usual one, from which there is a gap."""
 
 
 def is_gap(steps: NDArray[np.float64], frame_spacing: float) -> NDArray[np.bool_]:
@@ -419,7 +420,7 @@ def _check_field(name: str, values: NDArray[np.float32], time: float) -> None:
         raise SceneError(f"scene: {name!r} is not finite everywhere at {time:.9g} s")
     if name == "temperature" and not COLDEST <= lowest <= highest <= HOTTEST:
         wrong = lowest if lowest < COLDEST else highest
-        hint = "; it looks like °C, add 273.15" if -100.0 < wrong < COLDEST else ""
+        hint = f"; it looks like °C, add {ZERO_CELSIUS}" if -100.0 < wrong < COLDEST else ""
         raise SceneError(
             f"scene: temperature {wrong:.6g} at {time:.9g} s, expected kelvin of "
             f"{COLDEST:g} to {HOTTEST:g}{hint}"

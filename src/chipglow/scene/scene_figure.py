@@ -18,12 +18,24 @@ from chipglow.scene.scene import Scene
 from chipglow.scene.tool import Tool
 
 _COLOURS: Final = {Material.VOID: VOID, Material.WORKPIECE: BLUE, Material.TOOL: GREY}
+
 _PANEL_WIDTH: Final = 2.6
+"""Width of a panel in inches."""
+
 _PANEL_HEIGHTS: Final = (1.0, 3.4)
-_AROUND: Final = 0.46
-_HISTOGRAM: Final = 1.8
+"""Smallest and largest height of a panel in inches."""
+
+_LABEL_HEIGHT: Final = 0.46
+"""Height in inches of title and labels of a panel."""
+
+_HISTOGRAM_HEIGHT: Final = 1.8
+"""Height of a histogram in inches."""
+
 _BINS: Final = 60
+"""Bins of a histogram."""
+
 _ARROWS: Final = 14
+"""Arrows along the longer side of a panel."""
 
 
 def draw_scene(scene: Scene, time: float | None = None) -> Figure:
@@ -37,8 +49,8 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
     rows = ceil((len(panels) + has_kinds + has_quality) / 2)
     histogram_rows = ceil(len(panels) / 2)
     with drawing.style():
-        images = rows * (_panel_height(raster) + _AROUND) + _AROUND
-        histograms = histogram_rows * _HISTOGRAM
+        images = rows * (_panel_height(raster) + _LABEL_HEIGHT) + _LABEL_HEIGHT
+        histograms = histogram_rows * _HISTOGRAM_HEIGHT
         figure = drawing.new_figure(images + histograms)
         figure.suptitle(f"{frame.time * 1e6:.6g} µs")
         # The layout of subfigures leaves too little room for labels on their left.

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.drawing.scales import KELVIN, shown_frame
-from chipglow.quantities import Brief
+from chipglow.drawing.scales import shown_frame
+from chipglow.quantities import ZERO_CELSIUS, Brief
 from chipglow.scene.frame import FILLED, Frame, Material
 from chipglow.scene.scene import Scene
 
@@ -27,7 +27,7 @@ class _Field(NamedTuple):
 
 
 _FIELDS: Final = {
-    "temperature": _Field("temperature", "°C", offset=-KELVIN),
+    "temperature": _Field("temperature", "°C", offset=-ZERO_CELSIUS),
     "plastic_strain": _Field("plastic strain"),
     "plastic_strain_rate": _Field("strain rate", "1/s"),
     "velocity_x": _Field("velocity along x", "m/s"),

@@ -15,13 +15,24 @@ from chipglow.quantities.units import ANGLE, LENGTH
 from chipglow.scene.tool_surface import ToolSurface, surface_distance, surface_distances, surface_of
 
 SMALLEST_WEDGE: Final = radians(5.0)
+"""Smallest wedge angle in rad; a thinner tool is a mistake."""
+
 STEEPEST_RAKE: Final = radians(60.0)
+"""Largest rake angle in rad of either sign."""
+
 LARGEST_CLEARANCE: Final = radians(45.0)
+"""Largest clearance angle in rad."""
 
 _RIGHT_ANGLE: Final = pi / 2
+
 _ARC_STEP: Final = pi / 64
+"""Angle in rad between two points of an arc."""
+
 _HONE_PIECES: Final = 64
+"""Pieces of a honed edge."""
+
 _LARGEST_FORM_FACTOR: Final = 10.0
+"""Largest form factor of a hone, and one over the smallest."""
 
 
 class Tool(ABC):

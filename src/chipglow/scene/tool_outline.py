@@ -13,12 +13,24 @@ from chipglow.scene.tool import SMALLEST_WEDGE, Chamfer, Hone, Tool, ToolGeometr
 from chipglow.scene.tool_surface import FACE_LENGTH
 
 MOST_POINTS: Final = 1000
+"""Most points of a tool's outline."""
 
 _LARGEST_SPAN: Final = 20e-3
+"""Largest extent of an outline in m."""
+
 _SHORTEST_PIECE: Final = 1e-9
+"""Shortest piece of an outline in m; shorter ones have no direction."""
+
 _STRAIGHT: Final = 0.2e-6
+"""Height of points over the line between their ends, as a length in m, up to which a face is
+straight."""
+
 _TOUCHING: Final = 1e-10
+"""Distance in m of a point from a line that is taken for 0: rounding."""
+
 _LEVEL: Final = 1e-12
+"""Height in m of the lowest point that counts as 0."""
+
 _WEDGE: Final = ("rake_angle", "clearance_angle", "edge_radius")
 _EDGES: Final[Mapping[str, type[Chamfer | Hone]]] = {"chamfer": Chamfer, "hone": Hone}
 _ORDER: Final = (

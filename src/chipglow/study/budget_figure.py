@@ -12,7 +12,9 @@ from chipglow.drawing import drawing, scales
 if TYPE_CHECKING:
     from chipglow.study.budgets import StudyBudget
 
-_LARGEST: Final = 6
+_SHOWN_INPUTS: Final = 6
+"""Inputs of the largest contributions that are shown."""
+
 _HEIGHT: Final = 0.22
 """Height of a bar in inches."""
 
@@ -22,14 +24,14 @@ def draw_budget(result: "StudyBudget") -> Figure:
     frame, summary = result.to_frame(), result.summary().set_index("reading")
     colour_of = dict(zip(result.group_names, cycle(scales.COLOURS)))
     groups = [one for one in colour_of if one in set(frame.group)]
-    count = min(frame.input.nunique(), _LARGEST) + 1
+    count = min(frame.input.nunique(), _SHOWN_INPUTS) + 1
     with drawing.style():
         figure = drawing.new_figure(len(result.readings) * (count * _HEIGHT + 0.75) + 0.4)
         panels = figure.subplots(len(result.readings), 1, squeeze=False, sharex=True)[:, 0]
         for panel, (reading, part) in zip(
             panels, frame.groupby("reading", sort=False), strict=True
         ):
-            part = part.nlargest(_LARGEST, "contribution_K")
+            part = part.nlargest(_SHOWN_INPUTS, "contribution_K")
             positions = np.arange(len(part))
             colours = [colour_of[group] for group in part.group]
             panel.barh(positions, part.contribution_K, color=colours)

@@ -308,12 +308,14 @@ def check_draws(study: Study, inputs: Inputs) -> None:
 
     Limits of single settings truncate the distributions; here settings contradict each other.
     """
-    stated = study.stated()
     for one in [part for part in inputs.inputs if part.name in study.uncertainty.inputs]:
         ends = one.at(np.array([_EXTREME, 1 - _EXTREME])).tolist()
         name = one.name.partition(".")[0]
         for value in one.values or ends:
-            _section(getattr(study, name), f"{name}.", {one.name: value}, stated.get(name))
+            if name == "cutting":
+                _changed(study, "", {one.name: value})
+            else:
+                _changed(getattr(study, name), f"{name}.", {one.name: value})
 
 
 def errors_of(numbers: Array) -> Array:
@@ -333,25 +335,20 @@ def readings_of(
 
 
 def _seen(
-    study: Study,
-    scene: Scene,
-    drawn: Mapping[str, float] = MappingProxyType({}),
-    stated: Mapping[str, Any] = MappingProxyType({}),
+    study: Study, scene: Scene, drawn: Mapping[str, float] = MappingProxyType({})
 ) -> tuple[Mapping[str, Surface], Camera]:
     """Return a study's surfaces and camera on a scene, drawn settings in place of its stated."""
     surface, camera = (
-        _section(getattr(study, name), f"{name}.", drawn, stated.get(name))
-        for name in (SURFACE, CAMERA)
+        _changed(getattr(study, name), f"{name}.", drawn) for name in (SURFACE, CAMERA)
     )
     return surfaces_on(scene, surface, study.seed)[0], camera.on(scene.raster, study.seed)
 
 
-def _section(
-    part: Any, prefix: str, drawn: Mapping[str, float], stated: Mapping[str, Any] | None
-) -> Any:
+def _changed(part: Any, prefix: str, drawn: Mapping[str, float]) -> Any:
+    """Return a section, or a study with the prefix "", with the drawn settings."""
     own = {path.removeprefix(prefix): one for path, one in drawn.items() if path.startswith(prefix)}
     try:
-        return changed(part, own, stated) if own else part
+        return changed(part, own) if own else part
     except ValueError as reason:
         raise ValueError(
             f"uncertainty.inputs: a draw is impossible: {prefix}{reason}; state a smaller or a "
@@ -364,12 +361,12 @@ def reader(
 ) -> Callable[[Array], Array]:
     """Return the function from values of inputs, (trial, input), to (trial, reading, number)."""
     optical = [name for name in names if name.startswith(("camera.", "surface."))]
-    nominal, stated = _seen(study, scene), study.stated()
+    nominal = _seen(study, scene)
 
     def read(row: Array) -> Array:
         values = dict(zip(names, row.tolist(), strict=True))
         drawn = {name: values[name] for name in optical}
-        surfaces, camera = _seen(study, scene, drawn, stated) if drawn else nominal
+        surfaces, camera = _seen(study, scene, drawn) if drawn else nominal
         return readings.read(camera, surfaces, values)
 
     def read_all(rows: Array) -> Array:

@@ -22,12 +22,11 @@ from chipglow.camera import (
 )
 from chipglow.io.column_file import read_response
 from chipglow.quantities import FileBeside, Parameter, Part, made_from, unchecked
-from chipglow.quantities.units import COLDEST, LENGTH, POSITION, WAVELENGTHS, InSI, is_number
+from chipglow.quantities.units import COLDEST, LENGTH, POSITION, WAVELENGTHS
 from chipglow.radiometry import Band
+from chipglow.radiometry.band import PAPER_BAND
 from chipglow.scene import Raster
 from chipglow.text import read_yaml
-
-PAPER_BAND: Final = 3.8e-6, 5.1e-6
 
 _FILE: Final = Path(__file__).with_name("cameras.yaml")
 CAMERAS: Final[Mapping[str, Mapping[str, Any]]] = read_yaml(_FILE)
@@ -126,51 +125,45 @@ class CameraSection(CameraSettings, CameraModel):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _ = self._camera  # refuses settings that contradict each other
-
-    @classmethod
-    def completed(cls, data: Any, from_file: bool) -> Any:
-        """Return the data, completed by preset, detector and lens."""
-        if not isinstance(data, Mapping):
-            return data
-        name = data.get("preset")
-        if name not in (None, "none"):
-            if name not in list(CAMERAS):  # a mapping or list has no hash
-                known = ", ".join(CAMERAS)
-                raise ValueError(f"preset: {name!r} is unknown, expected one of {known}")
-            preset = {key: value for key, value in CAMERAS[name].items() if key != "source"}
-            data = {**preset, **data}
-        if data.get("detector_pitch") not in (None, "none"):
+        if self.detector_pitch is not None:
             # A camera by its data sheet: the paper's order would count its footprint twice.
-            data = {"psf_order": "optics", **data}
-        elif data.get("magnification") not in (None, "none") and "pitch" in data:
+            self.derive(pitch=self._pitch_on_scene(self.detector_pitch), psf_order="optics")
+        elif self.magnification is not None and "pitch" in self.given:
             raise ValueError(
                 "magnification: cannot be combined with pitch, which is the distance on the scene; "
                 "give the distance on the detector as detector_pitch"
             )
-        camera = _of_its_band(cls.with_pitch(data, from_file), from_file)
-        if camera.get("detector") not in (None, "none") and "lower_limit" not in data:
-            return {**camera, "lower_limit": "detector"}
-        return camera
+        if self.band != PAPER_BAND:
+            self.derive(psf=AnnularAperturePSF(wavelength=None), lower_limit=None)
+        if self.detector is not None:
+            self.derive(lower_limit=FROM_DETECTOR)
+        _ = self._camera  # refuses settings that contradict each other
 
     @classmethod
-    def with_pitch(cls, data: Mapping[str, Any], from_file: bool) -> dict[str, Any]:
-        """Return the data with the pitch on the scene that follows from the data sheet."""
-        magnification = data.get("magnification")
-        if data.get("detector_pitch") in (None, "none"):
-            return dict(data)
-        if not is_number(magnification):
+    def completed(cls, data: Any) -> Any:
+        """Return the data, completed by those of the preset."""
+        if not isinstance(data, Mapping):
+            return data
+        name = data.get("preset")
+        if name in (None, "none"):
+            return data
+        if name not in list(CAMERAS):  # a mapping or list has no hash
+            known = ", ".join(CAMERAS)
+            raise ValueError(f"preset: {name!r} is unknown, expected one of {known}")
+        preset = {key: value for key, value in CAMERAS[name].items() if key != "source"}
+        return {**preset, **data}
+
+    def _pitch_on_scene(self, detector_pitch: float) -> float:
+        """Return the pitch on the scene that follows from the data sheet."""
+        if self.magnification is None:
             raise ValueError("magnification: must be given with detector_pitch")
-        if not magnification > 0:
-            raise ValueError(f"magnification: {magnification:g}, must be positive")
-        pitch = cls.number(data, "detector_pitch", from_file) / magnification
-        given = cls.number(data, "pitch", from_file, pitch)
-        if abs(given - pitch) > _SAME_PITCH * pitch:
+        pitch = detector_pitch / self.magnification
+        if "pitch" in self.given and abs(self.pitch - pitch) > _SAME_PITCH * pitch:
             raise ValueError(
-                f"pitch: {data['pitch']} contradicts detector_pitch / magnification, "
+                f"pitch: {LENGTH.text(self.pitch)} contradicts detector_pitch / magnification, "
                 f"{LENGTH.text(pitch)}; state only one of them"
             )
-        return {**data, "magnification": float(magnification), "pitch": InSI(pitch)}
+        return pitch
 
     def build(self, seed: int = 2010) -> Camera:
         """Return the camera with its array, or with as many pixels as see a scene.
@@ -223,14 +216,3 @@ class CameraSection(CameraSettings, CameraModel):
             return None
         psf = self.psf.for_camera(band, self.magnification)
         return BlurredPSF(psf, self.blur) if self.blur else psf
-
-
-def _of_its_band(camera: Mapping[str, Any], from_file: bool) -> dict[str, Any]:
-    """Return a camera's data; in another band than the paper's, without its PSF and limit."""
-    try:
-        band = WAVELENGTHS.parse_range(camera.get("band", PAPER_BAND), not from_file)
-    except ValueError:  # which reading the field reports
-        band = PAPER_BAND
-    if band == PAPER_BAND:
-        return dict(camera)
-    return {"psf": AnnularAperturePSF(wavelength=None), "lower_limit": None, **camera}

@@ -19,7 +19,7 @@ from chipglow.camera import (
 )
 from chipglow.laboratory.emissivity import RegionTemperatures, TrueTemperature
 from chipglow.laboratory.emissivity.observations import UNIFORMITY
-from chipglow.quantities import Array, changed
+from chipglow.quantities import ZERO_CELSIUS, Array, changed
 from chipglow.quantities.units import FREQUENCY, TEMPERATURE, TIME, Quantity
 from chipglow.radiometry import Band
 from chipglow.study.budgets import first_order_errors, reader, readings_of
@@ -41,6 +41,7 @@ _DRAWS: Final = 64
 """Draws of a study's inputs for its image of a place; their standard deviation is known to 9 %."""
 
 _SEED: Final = 2010
+"""Seed of the draws, so that the same files give the same numbers."""
 
 _MUST_AGREE: Final[dict[str, Quantity]] = {
     "integration_time": TIME,
@@ -107,7 +108,7 @@ class CorrectedTemperature:
             yield (
                 f"{name}: Monte Carlo does not confirm the expanded uncertainty of the corrected "
                 f"temperature to first order (JCGM 101, 8.1): the 95 % interval is "
-                f"{low - 273.15:.4g} °C to {high - 273.15:.4g} °C."
+                f"{low - ZERO_CELSIUS:.4g} °C to {high - ZERO_CELSIUS:.4g} °C."
             )
 
     @property

@@ -19,8 +19,8 @@ from chipglow.cutting import (
 )
 from chipglow.cutting.conditions import INITIAL_TEMPERATURE
 from chipglow.io import ToolSection
-from chipglow.quantities import Parameter, beside_the_study, made_from
-from chipglow.quantities.units import LENGTH, TEMPERATURE
+from chipglow.quantities import Parameter, Part, beside_the_study, made_from
+from chipglow.quantities.units import TEMPERATURE
 from chipglow.scene import Raster
 
 STEADY: Final = "steady"
@@ -33,18 +33,24 @@ class FieldOfViewSection(Raster):
 
     left: float = -650e-6
     top: float = 700e-6
-    spacing: Annotated[
-        float,
-        Parameter(
-            "Side of a sample. camera.pitch should be a whole multiple of it; the paper has 9.",
-            LENGTH,
-        ),
-    ] = 2 / 3e6
+    spacing: float = 2 / 3e6
     rows: int = 1170
     columns: int = 1035
 
     def build(self) -> Raster:
         return made_from(Raster, self)
+
+
+@dataclass(frozen=True)
+class WindowSection(OutputWindow):
+    """The part of the cut that becomes the scene; the paper's by default."""
+
+    def __post_init__(self) -> None:
+        # `build` checks the order of the ends, when those that follow from others are known.
+        Part.__post_init__(self)
+
+    def build(self) -> OutputWindow:
+        return made_from(OutputWindow, self)
 
 
 @dataclass(frozen=True)
@@ -110,22 +116,32 @@ class WorkpieceAndTool(CuttingConditions):
 class CuttingSection(CutSettings, WorkpieceAndTool):
     """The cutting simulation; the paper's Table 2."""
 
-    window: Annotated[OutputWindow, Parameter("The part of the cut that becomes the scene.")] = (
-        field(default_factory=OutputWindow)
+    window: Annotated[WindowSection, Parameter("The part of the cut that becomes the scene.")] = (
+        field(default_factory=WindowSection)
     )
     field_of_view: Annotated[
         FieldOfViewSection,
-        Parameter("Samples of the scene: the tool's tip is near the origin, y points up."),
+        Parameter(
+            "Samples of the scene: the tool's tip is near the origin, y points up. camera.pitch "
+            "should be a whole multiple of spacing; the paper has 9."
+        ),
     ] = field(default_factory=FieldOfViewSection)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self.material()
+
+    def check_window(self) -> None:
+        """Raise a ValueError unless the window is a part of the cut."""
+        try:
+            self.window.build()
+        except ValueError as error:
+            raise ValueError(f"window: {error}") from None
         if self.window.end > self.cutting_length * (1 + 1e-9):
             raise ValueError(
                 f"window.end: {self.window.end * 1e3:g} mm is beyond cutting_length, "
                 f"expected up to {self.cutting_length * 1e3:g} mm"
             )
-        self.material()
 
     def material(self) -> WorkpieceMaterial:
         """Return the workpiece's material, with the factors on its numbers."""

@@ -34,9 +34,13 @@ _KEPT: Final = 4
 """A round keeps one setting of this many, and draws this many times as often."""
 
 _FEWEST_DRAWS: Final = 16
-_FEWEST_KEPT: Final = 4
+"""Fewest draws of a search."""
 
-_COVERAGE: Final = 2.0
+_FEWEST_KEPT: Final = 4
+"""Fewest settings that a round of a search keeps."""
+
+_COVERAGE_FACTOR: Final = 2.0
+"""Standard deviations of an expanded uncertainty."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -297,7 +301,7 @@ class _Search:
         for n, numbers in self.numbers.items():
             errors = errors_of(numbers)
             draws[n], bias[n] = len(errors), errors.mean(axis=0)
-            spread[n] = _COVERAGE * errors.std(axis=0, ddof=1)
+            spread[n] = _COVERAGE_FACTOR * errors.std(axis=0, ddof=1)
             lost[n], full[n] = numbers[..., [BELOW, SATURATED]].mean(axis=0).T
             for parts, most, state in (
                 (lost[n], below, "below the lower range limit"),

@@ -3,8 +3,9 @@
 from pathlib import Path
 from typing import Final
 
+from chipglow.quantities import placed
 from chipglow.study.schema import Study
-from chipglow.text import DescriptionError, commented_yaml, placed, read_yaml, validated
+from chipglow.text import DescriptionError, commented_yaml, read_yaml, validated
 
 
 def load_study(path: str | Path, scene: str | Path | None = None) -> Study:
@@ -31,7 +32,7 @@ def load_study(path: str | Path, scene: str | Path | None = None) -> Study:
             f"{path.name}: is empty, expected a study (chipglow init writes the paper's)"
         )
     if scene is not None:
-        data = placed(data, ["scene"], str(Path(scene).resolve()))
+        data = placed(data, {"scene": str(Path(scene).resolve())})
     return validated(Study, data, path.name, path.parent)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, TypeAlias
 
 from chipglow.analysis import Plan
-from chipglow.quantities import Part, own_settings
+from chipglow.quantities import ZERO_CELSIUS, Part, own_settings
 from chipglow.quantities.units import LENGTH
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study.schema import Study
@@ -25,8 +25,11 @@ from chipglow.text.template import yaml_line
 
 Follow: TypeAlias = Literal["material", "mean", "none"]
 
-_FEW_FRAMES: Final = 5
-_FEW_CELLS: Final = 10
+_FRAMES_NEEDED: Final = 5
+"""Frames of a scene within an exposure below which it is a warning."""
+
+_CELLS_NEEDED: Final = 10
+"""Cells within the feed below which it is a warning."""
 
 _HOW_FINELY: Final = {
     "cutting": {"numerics", "window", "field_of_view", "cutting_length", "surroundings"},
@@ -105,16 +108,16 @@ def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
             if isinstance(one, FeatureTrends):
                 trends.extend(one.trends.values())
         for low, high in dict.fromkeys(trend.measured for trend in trends):
-            text = f"The emissivity of {name!r} was measured at {low - 273.15:.0f} °C"
+            text = f"The emissivity of {name!r} was measured at {low - ZERO_CELSIUS:.0f} °C"
             if low == high:
                 yield f"{text}: it is taken to be the same at all temperatures."
             else:
-                yield f"{text} to {high - 273.15:.0f} °C: its straight line is extrapolated."
+                yield f"{text} to {high - ZERO_CELSIUS:.0f} °C: its straight line is extrapolated."
 
 
 def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
     exposure, spacing = study.camera.integration_time, scene.frame_spacing
-    if len(scene.times) > 1 and exposure < _FEW_FRAMES * spacing * (1 - 1e-9):
+    if len(scene.times) > 1 and exposure < _FRAMES_NEEDED * spacing * (1 - 1e-9):
         yield (
             f"Each frame of the scene represents {spacing * 1e6:.3g} us of the exposure's "
             f"{exposure * 1e6:.3g} us: motion within that time is neglected. Use a scene with more "
@@ -122,10 +125,10 @@ def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
         )
     cutting = study.cutting
     cells = cutting.feed / cutting.numerics.cell
-    if study.scene is None and cells < _FEW_CELLS * (1 - 1e-9):
+    if study.scene is None and cells < _CELLS_NEEDED * (1 - 1e-9):
         yield (
             f"The feed is {cells:.3g} cells: too coarse for forces and shear bands; use "
-            f"{_FEW_CELLS} or more (cutting.numerics.cell)."
+            f"{_CELLS_NEEDED} or more (cutting.numerics.cell)."
         )
 
 
@@ -185,7 +188,7 @@ def _unset(
     for one in own_settings(section):
         if one.name in without or one.plain in ("none", []):
             continue
-        if one.name not in section.given:
+        if one.name not in section.given | section.derived:
             yield f"{prefix}{one.name} {_written(one.plain)}", papers is not None
         elif one.is_section:
             inner = getattr(papers, one.name, None)

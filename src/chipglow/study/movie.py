@@ -18,20 +18,38 @@ from chipglow.cutting import CuttingSimulation
 from chipglow.drawing import drawing, scales
 from chipglow.io import movie_writer
 from chipglow.io.movie_file import PALETTE_SIZE
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Frame, Material, Raster
 from chipglow.scene.figures import show_image
 
 _DPI: Final = 100
-_WIDTH: Final = 1320
-_PANEL: Final = 300
-_AROUND: Final = 130
-_HEIGHTS: Final = (240, 1080)
-_TOOL: Final = "#9ca3af"
-_FAR: Final = 3e-3
+"""Pixels per inch."""
 
-_HOT: Final = 0.6
-_STRAIN: Final = 5.0
+_WIDTH: Final = 1320
+"""Width of the movie in pixels."""
+
+_PANEL_WIDTH: Final = 300
+"""Width of a panel in pixels."""
+
+_LABEL_HEIGHT: Final = 130
+"""Height in pixels of title and labels."""
+
+_HEIGHTS: Final = (240, 1080)
+"""Smallest and largest height of the movie in pixels."""
+
+_TOOL: Final = "#9ca3af"
+
+_FACE_LENGTH: Final = 3e-3
+"""Length in m to which the tool's faces are drawn."""
+
+_HOT_FRACTION: Final = 0.6
+"""Place of the hottest colour from the initial temperature, 0, to the melting point, 1."""
+
+_LARGEST_STRAIN: Final = 5.0
+"""Plastic strain of the last colour."""
+
 _DECADES: Final = 3
+"""Decades of the colours of the strain rate."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +64,12 @@ class MovieScales:
     def of(cls, simulation: CuttingSimulation) -> "MovieScales":
         conditions = simulation.conditions
         start = conditions.initial_temperature
-        hottest = start + _HOT * max(simulation.workpiece.melting_temperature - start, 0.0)
-        top = 50.0 * ceil((hottest - scales.KELVIN) / 50.0 + 1e-9) + scales.KELVIN
+        hottest = start + _HOT_FRACTION * max(simulation.workpiece.melting_temperature - start, 0.0)
+        top = 50.0 * ceil((hottest - ZERO_CELSIUS) / 50.0 + 1e-9) + ZERO_CELSIUS
         decade = floor(log10(0.1 * conditions.speed / conditions.feed) + 1e-9)
         return cls(
             temperature=(start, top),
-            strain=(0.0, _STRAIN),
+            strain=(0.0, _LARGEST_STRAIN),
             rate=(10.0**decade, 10.0 ** (decade + _DECADES)),
         )
 
@@ -78,7 +96,7 @@ class CutPicture:
         rate = np.maximum(frame.needed("plastic_strain_rate"), self._slowest)
         for image, values, shown in zip(
             self._images,
-            (frame.temperature - np.float32(scales.KELVIN), frame.needed("plastic_strain"), rate),
+            (frame.temperature - np.float32(ZERO_CELSIUS), frame.needed("plastic_strain"), rate),
             (there, solid, solid),
             strict=True,
         ):
@@ -91,13 +109,13 @@ class CutPicture:
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
     def _build(self, ends: MovieScales) -> None:
-        high = _AROUND + _PANEL * self._raster.rows / self._raster.columns
+        high = _LABEL_HEIGHT + _PANEL_WIDTH * self._raster.rows / self._raster.columns
         height = 2 * round(min(max(high, _HEIGHTS[0]), _HEIGHTS[1]) / 2)
         self._figure = Figure(figsize=(_WIDTH / _DPI, height / _DPI), dpi=_DPI, layout="compressed")
         self._canvas = cast(Any, FigureCanvasAgg(self._figure))  # untyped
         self._figure.get_layout_engine().set(w_pad=0.09)  # type: ignore[union-attr, call-arg]
         self._slowest = ends.rate[0]
-        low, top = (limit - scales.KELVIN for limit in ends.temperature)
+        low, top = (limit - ZERO_CELSIUS for limit in ends.temperature)
         looks: Any = (
             ("temperature", "temperature / °C", scales.HEAT, (low, top), "max"),
             ("plastic strain", "plastic strain", scales.PLAIN, ends.strain, "max"),
@@ -114,7 +132,7 @@ class CutPicture:
             axes.label_outer()
             self._images.append(image)
         for axes in panels[1:]:
-            axes.fill(*(self._tool.outline(_FAR) * 1e6).T, color=_TOOL, zorder=1.5)
+            axes.fill(*(self._tool.outline(_FACE_LENGTH) * 1e6).T, color=_TOOL, zorder=1.5)
         self._title = self._figure.suptitle(" ", fontsize=11)
         self._moving: list[Artist] = [self._title]
         for axes in panels:

@@ -15,6 +15,7 @@ PREVIEW_FRAMES: Final = 120
 """About how many frames a preview has."""
 
 _MOST_SAMPLES: Final = 360
+"""Samples along the longer side of a preview."""
 
 
 def preview_raster(study: Study) -> Raster:

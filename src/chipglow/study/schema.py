@@ -7,10 +7,10 @@ from typing import Annotated, Any, Self
 
 from chipglow.analysis import AttributionPlan, CorrectionPlan, Plan, WavelengthPlan
 from chipglow.camera import AnnularAperturePSF
-from chipglow.quantities import FileBeside, Parameter, Part, changed, value_at
+from chipglow.quantities import FileBeside, Parameter, Part, changed
 from chipglow.study.camera_section import CameraSection
 from chipglow.study.cutting_section import STEADY, CuttingSection
-from chipglow.study.scaling import DERIVED, VIEWS, scaled, without
+from chipglow.study.scaling import resolved
 from chipglow.study.surface_section import FeaturesSection, SurfaceSection, surface_names
 from chipglow.study.uncertainty_section import UncertaintySection
 from chipglow.text import commented_yaml
@@ -151,34 +151,32 @@ class Study(Part):
         return changed(cls(), {"title": title, **paths, "analysis": draws})
 
     @classmethod
-    def completed(cls, data: Any, from_file: bool) -> Any:
-        """Return the data with the surface's usual kind, and what follows from feed and camera."""
+    def completed(cls, data: Any) -> Any:
+        """Return the data with the surface's usual kind."""
         if not isinstance(data, Mapping):
             return data
         surface = data.get("surface")
         if isinstance(surface, Mapping) or (surface is None and "surface" in data):
-            data = {**data, "surface": {"kind": "features", **(surface or {})}}
-        return scaled(data, from_file)
-
-    def stated(self) -> dict[str, Any]:
-        """Return the given settings without those that follow from others."""
-        cutting = self.cutting.stated()
-        data = super().stated() | {"camera": self.camera.stated(), "cutting": cutting}
-        data["cutting"] |= {name: cutting[name].stated() for name in VIEWS if name in cutting}
-        try:
-            plain = type(self)(**without(data, DERIVED))
-        except ValueError:  # what is left is impossible
-            return data
-        return without(
-            data, [path for path in DERIVED if value_at(plain, path) == value_at(self, path)]
-        )
+            return {**data, "surface": {"kind": "features", **(surface or {})}}
+        return data
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self._resolve_cutting()
         if isinstance(self.surface, FeaturesSection):
             self._check_chips()
         if self.scene is None:
             self._check_camera()
+
+    def _resolve_cutting(self) -> None:
+        """Set what follows from feed, rake angle, speed and camera, if the scene is a cut."""
+        try:
+            if self.scene is None:
+                object.__setattr__(self, "cutting", resolved(self.cutting, self.camera))
+                object.__setattr__(self, "given", self.given | {"cutting"})
+            self.cutting.check_window()
+        except ValueError as error:
+            raise ValueError(f"cutting.{error}") from None
 
     def _check_chips(self) -> None:
         for name in ("rake_chip", "band_chip"):

@@ -15,6 +15,7 @@ from chipglow.laboratory.emissivity import (
 from chipglow.quantities import FileBeside, Parameter, Part, made_from
 from chipglow.quantities.units import WAVELENGTHS
 from chipglow.radiometry import Band
+from chipglow.radiometry.band import PAPER_BAND
 from chipglow.surface import (
     CHIP_1,
     CHIP_2,
@@ -56,7 +57,7 @@ class ChipSection(Part):
         return {"anyOf": [section, {"enum": list(CHIPS)}]}
 
     @classmethod
-    def completed(cls, data: Any, from_file: bool) -> Any:
+    def completed(cls, data: Any) -> Any:
         """Return the data, or those of the paper's chip of this name."""
         if not isinstance(data, str):
             return data
@@ -132,7 +133,7 @@ class FeaturesSection(FeatureSettings, Chips):
     measured_in: Annotated[
         tuple[float, float],
         Parameter("Band in which these emissivities were measured.", WAVELENGTHS),
-    ] = (3.8e-6, 5.1e-6)
+    ] = PAPER_BAND
     measured_on: Annotated[
         str | None,
         Parameter("Metal on which they were measured, such as Ti-6Al-4V; or none: not known."),

@@ -12,6 +12,8 @@ from chipglow.drawing import drawing, scales
 from chipglow.quantities import Quantity
 
 _MAX_READINGS: Final = 6
+"""Readings that are drawn."""
+
 _DARK: Final = 0.6
 """Fraction of the limits from which a colour is so dark that text on it is white."""
 

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Final
 from chipglow.quantities import Parameter, Part, setting_at
 from chipglow.quantities.units import is_bare_number
 from chipglow.uncertainty import Input, Inputs
-from chipglow.uncertainty.component import HALF_WIDTHS, Distribution
-from chipglow.uncertainty.inputs import InputDistribution
+from chipglow.uncertainty.component import HALF_WIDTHS, DistributionKind
+from chipglow.uncertainty.inputs import InputDistributionKind
 
 _SECTIONS: Final = ("camera", "surface", "cutting")
 
@@ -30,7 +30,7 @@ class InputSection(Part):
         tuple[float | str, ...], Parameter("Values of equal probability instead, or [].")
     ] = ()
     distribution: Annotated[
-        Distribution | None,
+        DistributionKind | None,
         Parameter("Distribution. Default: normal; rectangular with a half-width."),
     ] = None
     degrees_of_freedom: Annotated[
@@ -57,7 +57,7 @@ class InputSection(Part):
             raise ValueError("degrees_of_freedom: requires a standard uncertainty that is normal")
 
     @property
-    def distribution_used(self) -> InputDistribution:
+    def distribution_used(self) -> InputDistributionKind:
         """Distribution; if it is not stated, normal, rectangular or discrete."""
         if self.values:
             return "discrete"

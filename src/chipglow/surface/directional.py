@@ -59,11 +59,11 @@ class Direction(Modifier):
     ) -> Change:
         ratio = np.float32(self.ratio(cos(self.tilt)))
 
-        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
+        def at_tilt(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
             seen: NDArray[np.float32] = np.minimum(emissivity * ratio, 1.0)
             return seen
 
-        return changed
+        return at_tilt
 
 
 @DIRECTIONS.part

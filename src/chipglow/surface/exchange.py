@@ -18,8 +18,13 @@ BOUNCES: Final = 64
 _Paths: TypeAlias = tuple[NDArray[np.int16], Array, NDArray[np.int64]]
 
 _GOLDEN: Final = (5.0**0.5 - 1.0) / 2.0
+"""Fractional part of the golden ratio, whose multiples spread rays evenly."""
+
 _OPEN: Final = -1
-_EDGE: Final = 1e-12
+"""Index for a ray that meets no element."""
+
+_ROUNDING: Final = 1e-12
+"""Part of an element by which a ray may miss it by rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +157,7 @@ def _trace_one(starts, ends, element, place, sine, bounces):  # type: ignore[no-
             fx, fy = starts[j, 0] - x, starts[j, 1] - y
             distance = (fx * -uy + fy * ux) / facing
             part = (fy * dx - fx * dy) / facing
-            if -_EDGE <= part <= 1.0 + _EDGE and 0.0 <= distance < nearest:
+            if -_ROUNDING <= part <= 1.0 + _ROUNDING and 0.0 <= distance < nearest:
                 nearest, found = distance, j
         if found == _OPEN:
             break

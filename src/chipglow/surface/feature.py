@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH
 from chipglow.radiometry import Band
+from chipglow.radiometry.band import PAPER_BAND
 from chipglow.scene import Frame, Material, Raster, Scene
 from chipglow.scene.raster import check_shape
 from chipglow.surface.blend import (
@@ -146,7 +147,7 @@ class FeatureSurface(FeatureSettings, Surface):
         return replace(self, **means)
 
 
-PAPER_ORIGIN: Final = Origin((3.8e-6, 5.1e-6), "AISI 1045")
+PAPER_ORIGIN: Final = Origin(PAPER_BAND, "AISI 1045")
 """Origin of the emissivities of the paper's Table 1."""
 
 CHIP_1: Final = FeatureSurface(
@@ -266,7 +267,7 @@ class EmissivityStack:
         if self.features is None:
             return np.stack([field.emissivity(frame) for field in self.fields])
         bare = self.features.emissivities(frame)
-        return np.stack([f.changed(one, frame) for f, one in zip(self.fields, bare, strict=True)])
+        return np.stack([f.modified(one, frame) for f, one in zip(self.fields, bare, strict=True)])
 
 
 @dataclass(frozen=True)
@@ -300,7 +301,7 @@ class FeatureTrends(Modifier):
         drawn = drawn_trends(tuple(self.trends.values()), self.draw)
         lines = dict(zip(self.trends, drawn, strict=True))
 
-        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
+        def at_temperature(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
             result, fractions = emissivity.astype(np.float64), feature_fractions(frame)
             for name in FEATURES:
                 if name in lines:
@@ -308,7 +309,7 @@ class FeatureTrends(Modifier):
                     result += fractions[name] * away
             return np.clip(result, 0.0, 1.0)
 
-        return changed
+        return at_temperature
 
 
 def feature_fractions(frame: Frame) -> dict[str, NDArray[np.float64]]:

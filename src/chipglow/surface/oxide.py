@@ -20,7 +20,11 @@ OXIDES: Final = Family("oxide")
 """Laws of oxide by their kind; other packages add theirs in the group ``chipglow.oxide``."""
 
 _MOST_CELLS: Final = 256
-_SAMPLES: Final = 4
+"""Most cells of the history of temperatures along the longer side."""
+
+_SAMPLES_PER_CELL: Final = 4
+"""Samples of the scene along a cell, at least."""
+
 _GROWN_FIELDS: Final = ("material_x", "material_y")
 
 
@@ -56,10 +60,10 @@ class Oxide(Modifier):
     ) -> Change:
         history = OxideHistory.from_scene(scene, self)
 
-        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
+        def oxidised(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
             return self.of_thickness(emissivity, history.thickness(frame))
 
-        return changed
+        return oxidised
 
     def of_thickness(self, bare: ArrayLike, thickness: ArrayLike) -> NDArray[np.float64]:
         """Return the emissivity of material of a bare one under oxide of a thickness in m."""
@@ -119,7 +123,9 @@ class OxideHistory:
             )
         (left, right), (bottom, top) = _reach(scene)
         cell = max(
-            _SAMPLES * scene.raster.spacing, max(right - left, top - bottom) / _MOST_CELLS, 1e-12
+            _SAMPLES_PER_CELL * scene.raster.spacing,
+            max(right - left, top - bottom) / _MOST_CELLS,
+            1e-12,
         )
         shape = ceil((top - bottom) / cell) + 1, ceil((right - left) / cell) + 1
         grown = np.zeros((len(scene.times), *shape), np.float32)

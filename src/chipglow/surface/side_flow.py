@@ -30,8 +30,14 @@ _INSIDE: Final = 0.75
 """Depth in samples at which the sample that holds a point lies wholly on one side of a face."""
 
 _RAKE_ELEMENTS: Final = 16
+"""Elements of the rake face, graded towards the contact."""
+
 _SIDE_ELEMENTS: Final = 24
+"""Elements of the bulged side of the chip, graded."""
+
 _FLAT_ELEMENTS: Final = 16
+"""Elements of the flat side of tool or chip, of that which is lower, graded."""
+
 _FLAT_REACH: Final = 8.0
 """Length of a flat side that is looked at, in heights of what stands out beside it."""
 
@@ -197,7 +203,7 @@ class SideShape(Modifier):
         def black(frame: Frame, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
             return np.asarray(black_in_band(frame.temperature[rows, columns].astype(np.float64)))
 
-        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
+        def with_reflections(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
             chip = frame.material[sections.probes] == Material.WORKPIECE
             tool = frame.material[sections.rows, sections.columns] == Material.TOOL
             touching = chip.any(axis=1) & tool.any(axis=1)
@@ -234,7 +240,7 @@ class SideShape(Modifier):
             result[rows, columns] = np.maximum(effective, 0.0)
             return result
 
-        return changed
+        return with_reflections
 
     def effective_emissivity(
         self, chip: float, tool: float, tool_radiance: float = 1.0, surroundings: float = 0.0

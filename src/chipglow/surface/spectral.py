@@ -19,6 +19,7 @@ from chipglow.quantities.units import (
     Wavelength,
 )
 from chipglow.radiometry import Band
+from chipglow.radiometry.band import PAPER_BAND
 from chipglow.scene import Frame, Scene
 from chipglow.surface.surface import SURFACES, Change, EmissivityField, Modifier, Surface
 from chipglow.surface.temperature import TemperatureSurface
@@ -29,8 +30,13 @@ SPECTRA: Final = Family("spectral")
 REFERENCE: Final = 293.15
 """Temperature in K at which resistivities are stated."""
 
-_STEP: Final = 5.0
-_NEAR: Final = 0.5
+_TEMPERATURE_STEP: Final = 5.0
+"""Step of the table in K."""
+
+_LEAST_CONTRAST: Final = 0.5
+"""Difference in K from the reflected temperature, within which the derivative at this distance is
+taken."""
+
 _LEAST: Final = 1e-6
 """An emissivity of a law of odds is at least this far from 0 and 1."""
 
@@ -53,11 +59,13 @@ class SpectralSurface(Surface):
 
     def in_band(self, band: Band, reflected: float | None) -> TemperatureSurface:
         """Return the emissivity by temperature that a camera of a band sees."""
-        temperature = np.arange(COLDEST, HOTTEST + _STEP / 2, _STEP)
+        temperature = np.arange(COLDEST, HOTTEST + _TEMPERATURE_STEP / 2, _TEMPERATURE_STEP)
         seen = temperature
         if reflected is not None:
             # The weights are a derivative where the surface is as warm as what it reflects.
-            seen = np.where(abs(seen - reflected) < _NEAR, reflected + _NEAR, seen)
+            seen = np.where(
+                abs(seen - reflected) < _LEAST_CONTRAST, reflected + _LEAST_CONTRAST, seen
+            )
         wavelength, weights = band.weights(seen)
         if reflected is not None:
             weights = weights - band.weights(reflected)[1]
@@ -160,7 +168,7 @@ class Dispersion(Modifier):
     effect = "spectral"
     is_grey = False
     law: SpectralSurface
-    measured_in: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
+    measured_in: Band = field(default_factory=lambda: Band(*PAPER_BAND))
     """The band in which the emissivity holds; the paper's by default."""
 
     @property
@@ -176,12 +184,12 @@ class Dispersion(Modifier):
         here, there = (np.clip(one.columns[1], _LEAST, 1 - _LEAST) for one in (known, seen))
         temperatures, odds = seen.columns[0], there / (1 - there) * (1 - here) / here
 
-        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
+        def in_the_band(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
             values = np.asarray(emissivity, np.float64)
             factor = np.interp(frame.temperature, temperatures, odds)
             return np.asarray(values * factor / (1 - values + values * factor), np.float64)
 
-        return changed
+        return in_the_band
 
 
 def required_band(name: str, band: Band | None) -> Band:

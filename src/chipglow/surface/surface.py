@@ -41,9 +41,9 @@ class EmissivityField:
 
     def emissivity(self, frame: Frame) -> NDArray[np.float32]:
         """Return the emissivity of every sample of a frame, shape (y, x); 0 in the void."""
-        return self.changed(self.bare(frame), frame)
+        return self.modified(self.bare(frame), frame)
 
-    def changed(self, bare: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
+    def modified(self, bare: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
         """Return a frame's emissivity of the bare one."""
         for change in self.changes:
             bare = np.asarray(change(bare, frame), np.float32)

@@ -22,6 +22,7 @@ STEPS: Final = 32
 """Entries of a table for each unit of the deviate."""
 
 _NORMAL_REACH: Final = 5.0
+"""Standard deviations within which emissivities of 0 to 1 must lie to be normal."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,8 @@ MAP_SIZE: Final = 128
 """Deviates across and down a map; with grains of 20 µm it repeats after 2.56 mm."""
 
 WIDTH: Final = MAP_SIZE + 4
+"""Columns of a map with the border that the splines need."""
+
 WRAP: Final = MAP_SIZE - 1
 # Cubic convolution (Keys, 1981; a = -1/2): weights of four nodes by powers of the way from the
 # second to the third, the cube first.
@@ -95,7 +98,10 @@ _CUBIC: Final = (
 )
 _AUTOCORRELATION: Final = np.array([1, -20, 71, 456, 71, -20, 1]) / 560
 """Overlap of that kernel with itself, for lags of −3 to 3 nodes."""
+
 _LANES: Final = tuple(ir.Constant(ir.IntType(32), lane) for lane in range(4))
+"""Indices of the lanes of a vector."""
+
 _LAST: Final = round(2 * REACH * STEPS)
 _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "forceinline": True}
 

@@ -4,7 +4,6 @@ from chipglow.text.cells import TableError as TableError
 from chipglow.text.description import (
     described_by as described_by,
     load_described as load_described,
-    placed as placed,
     validated as validated,
 )
 from chipglow.text.extras import install_command as install_command, needs_extra as needs_extra

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from chipglow.quantities import Part, Typed, adapter, problem
+from chipglow.quantities import Part, Typed, adapter, placed, problem
 from chipglow.text.yaml_file import DescriptionError, parse_yaml, read_yaml
 
 Kind = TypeVar("Kind", bound=Part)
@@ -39,12 +39,12 @@ def described_by(kind: type[Kind], path: Path, field: str, settings: Iterable[st
 
 
 def _with(data: Any, setting: str) -> Any:
-    place, equals, value = setting.partition("=")
-    names = place.strip().split(".")
-    if not equals or not all(names):
+    path, equals, value = setting.partition("=")
+    path = path.strip()
+    if not equals or not all(path.split(".")):
         raise DescriptionError(f"--set {setting}: expected FIELD=VALUE such as units.length=mm")
     try:
-        return placed(data, names, _typed(parse_yaml(value)))
+        return placed(data, {path: _typed(parse_yaml(value))})
     except ValueError as error:
         raise DescriptionError(f"--set {setting}: {error}") from None
 
@@ -56,11 +56,3 @@ def _typed(value: Any) -> Any:
     if isinstance(value, list):
         return [_typed(part) for part in value]
     return Typed(value) if isinstance(value, str) else value
-
-
-def placed(data: Any, names: list[str], value: Any) -> Any:
-    """Return data with a value set at a place, given by the names of its sections."""
-    if not names:
-        return value
-    inside = data if isinstance(data, dict) else {}
-    return {**inside, names[0]: placed(inside.get(names[0]), names[1:], value)}

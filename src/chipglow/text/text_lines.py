@@ -17,6 +17,8 @@ _HEAD: Final = 100_000
 """Bytes that hold the first two lines of any table whose columns have names."""
 
 _LONGEST_LINE: Final = 4_000_000
+"""Most characters of a line of a text file; a longer one is no table."""
+
 _TOO_LONG: Final = re.compile(rf"(?m)^[^\r\n]{{{_LONGEST_LINE + 1}}}")
 _BYTE_ORDER_MARKS: Final = (
     (codecs.BOM_UTF8, "utf-8-sig"),

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from chipglow.quantities import Array, Brief
 
-Distribution: TypeAlias = Literal["normal", "rectangular", "triangular", "arcsine"]
+DistributionKind: TypeAlias = Literal["normal", "rectangular", "triangular", "arcsine"]
 """Distribution of an error; a normal one with degrees of freedom is Student's."""
 
 HALF_WIDTHS: Final[Mapping[str, float]] = {
@@ -19,10 +19,13 @@ HALF_WIDTHS: Final[Mapping[str, float]] = {
 }  # fmt: skip
 """Half-widths of the bounded distributions of unit variance."""
 
+MAD_FACTOR: Final = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+
 _MOST: Final = 200_000_000
 """Numbers that the effects of one component may take: 1.6 GB."""
 
-_DISTRIBUTIONS: Final = get_args(Distribution)
+_DISTRIBUTIONS: Final = get_args(DistributionKind)
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,7 @@ class Cause:
     """Whether one estimate with these degrees of freedom serves all errors (JCGM 100:2008, H.3)."""
     parts: tuple[str, ...] = ()
     """Names of the errors in budgets, if each has a separate line."""
-    distribution: Distribution = "normal"
+    distribution: DistributionKind = "normal"
     """Distribution of each error."""
 
     def __post_init__(self) -> None:

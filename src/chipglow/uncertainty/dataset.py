@@ -16,12 +16,17 @@ import xarray as xr
 from scipy import sparse
 
 from chipglow.quantities import Array
-from chipglow.uncertainty.component import Cause, Component, Distribution
+from chipglow.uncertainty.component import Cause, Component, DistributionKind
 from chipglow.uncertainty.estimate import Estimate, factor
 
 _MOST_ERRORS: Final = 1000
+"""Most errors of a component that values share in a file."""
+
 _SHAPES: Final = {"normal": "gaussian"}
-_DISTRIBUTIONS: Final[Mapping[str, Distribution]] = {"gaussian": "normal", "uniform": "rectangular"}
+_DISTRIBUTIONS: Final[Mapping[str, DistributionKind]] = {
+    "gaussian": "normal",
+    "uniform": "rectangular",
+}
 
 _RANDOM, _SYSTEMATIC, _MATRIX = "random", "systematic", "err_corr_matrix"
 
@@ -137,7 +142,7 @@ def _read(data: xr.Dataset, variable: xr.DataArray, label: str) -> tuple[Cause, 
         float(attributes.get("degrees_of_freedom", np.inf)),
         bool(attributes.get("pooled", not own)),
         _texts(attributes.get("parts", ())),
-        _DISTRIBUTIONS.get(shape, cast("Distribution", shape)),
+        _DISTRIBUTIONS.get(shape, cast("DistributionKind", shape)),
     )
     return cause, int(attributes.get("error", 0)), effects
 

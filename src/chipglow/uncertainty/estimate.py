@@ -14,7 +14,7 @@ from scipy import sparse
 from scipy.special import stdtrit
 
 from chipglow.quantities import Array, Brief, brief
-from chipglow.uncertainty.component import Cause, Component, Distribution
+from chipglow.uncertainty.component import Cause, Component, DistributionKind
 
 _MOST_FREEDOM: Final = 1e6
 """Above this number, Student's factor of 95 % differs from the normal one by less than 3e-6."""
@@ -88,7 +88,7 @@ class Estimate(Brief):
         per_element: bool = False,
         degrees_of_freedom: float = np.inf,
         pooled: bool = True,
-        distribution: Distribution = "normal",
+        distribution: DistributionKind = "normal",
     ) -> "Estimate":
         """Return the estimate with one more component.
 

@@ -10,13 +10,13 @@ import numpy as np
 from scipy.special import ndtr, ndtri, stdtr, stdtrit
 
 from chipglow.quantities import Array
-from chipglow.uncertainty.component import HALF_WIDTHS, Distribution
+from chipglow.uncertainty.component import HALF_WIDTHS, DistributionKind
 from chipglow.uncertainty.limits import Limits
 
-InputDistribution: TypeAlias = Distribution | Literal["discrete", "random"]
+InputDistributionKind: TypeAlias = DistributionKind | Literal["discrete", "random"]
 """Distribution of an input; ``random`` is uniform from 0 to 1: an effect without a set value."""
 
-_DISTRIBUTIONS: Final = (*get_args(Distribution), "discrete", "random")
+_DISTRIBUTIONS: Final = (*get_args(DistributionKind), "discrete", "random")
 
 _EDGE: Final = 1e-12
 """Smallest distance from 0 and 1 of the number from which a value is computed."""
@@ -64,7 +64,7 @@ class Input:
     name: str
     value: float = 0.5
     standard_uncertainty: float = sqrt(1 / 12)
-    distribution: InputDistribution = "random"
+    distribution: InputDistributionKind = "random"
     degrees_of_freedom: float = inf
     values: tuple[float, ...] = ()
     group: str = ""

@@ -24,6 +24,7 @@ _SUMMARIES: Final = 4
 """Results that are to be stable together: mean, standard uncertainty and both ends."""
 
 _CONFIDENCE: Final = 0.95
+"""Confidence that all results are within the tolerance."""
 
 VALIDATED: Final = 0.05
 """Largest difference of the ends of two intervals that agree, in standard uncertainties.

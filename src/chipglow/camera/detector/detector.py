@@ -24,6 +24,8 @@ Correction: TypeAlias = Literal["two-point", "one-point", "none"]
 """Non-uniformity correction: by frames of two flat-field sources, of one, or none."""
 
 DARKER_SOURCE: Final = 0.1
+"""Fraction of the saturation of the darker of two flat-field sources."""
+
 BRIGHTER_SOURCE: Final = 0.8
 """Parts of the capacity that the sources of the correction fill, if none are named."""
 

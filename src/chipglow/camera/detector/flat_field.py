@@ -19,7 +19,7 @@ from chipglow.camera.detector.pixels import (
 )
 from chipglow.camera.detector.response import OperationPoint
 from chipglow.camera.measurement import Flag
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 from chipglow.quantities.units import COLDEST
 
 HALF: Final = 0.5
@@ -32,6 +32,8 @@ _MARGIN: Final = 5.0
 """Standard deviations under the mean of saturated frames from which on a count is saturated."""
 
 _SATURATED_FRAMES: Final = 8
+"""Frames of a saturated source from whose scatter the limit of the counts follows."""
+
 _SMALL: Final = (32, 32)
 """Elements by which the lower range limit is found."""
 
@@ -39,7 +41,11 @@ _QUANTISATION: Final = 12**-0.5
 """Standard deviation of rounding to whole counts."""
 
 _FAINTEST: Final = 1e-9
+"""Smallest light, as a fraction of that which fills the capacity, of a source that is searched for.
+"""
+
 _STREAMS: Final = {"cold": 1, "hot": 2, "saturated": 3, "netd": 4}
+"""Streams of random numbers, one for each source."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,7 +147,7 @@ def _sources(detector: Detector, point: OperationPoint) -> tuple[float, float]:
         part * full if kelvins is None else float(band.radiance(kelvins))
         for kelvins, part in ((detector.cold, DARKER_SOURCE), (detector.hot, BRIGHTER_SOURCE))
     )
-    cold, hot = (float(band.temperature(one)) - 273.15 for one in (dark, bright))
+    cold, hot = (float(band.temperature(one)) - ZERO_CELSIUS for one in (dark, bright))
     if not dark < bright:
         raise ValueError(
             f"detector: the sources of the correction are of {cold:.4g} °C and {hot:.4g} °C, "
@@ -150,7 +156,7 @@ def _sources(detector: Detector, point: OperationPoint) -> tuple[float, float]:
     if not bright < full:
         raise ValueError(
             f"Detector.hot: {hot:.4g} °C fills the detector at its exposure, expected less than "
-            f"{float(band.temperature(full)) - 273.15:.4g} °C"
+            f"{float(band.temperature(full)) - ZERO_CELSIUS:.4g} °C"
         )
     return dark, bright
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import label
 
 from chipglow.quantities import Array, Brief
+from chipglow.uncertainty.component import MAD_FACTOR
 
 LEAST_FRAMES: Final = 8
 """Number of frames from which the noise of a pixel is determined."""
@@ -19,13 +20,14 @@ GAIN_LIMITS: Final = (0.5, 1.5)
 """Gains relative to the median gain that are still good."""
 
 LEVEL_LIMIT: Final = 8.0
-"""Multiple of the pixels' spread (1.4826 times the median absolute deviation) by which the mean of
+"""Multiple of the pixels' spread (1.48 times the median absolute deviation) by which the mean of
 a good pixel is from the median at most, of one flat-field source."""
 
 LARGEST_CLUSTER: Final = 4
 """Pixels of the largest cluster, neighbours over corner included, that is replaced."""
 
 _FEWEST_NEIGHBOURS: Final = 3
+"""Fewest good pixels around a bad one that replace it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -115,7 +117,7 @@ def find_bad_pixels(frames: NDArray[Any], hot: NDArray[Any] | None = None) -> Ba
     stuck, noisy = _by_noise(frames)
     if hot is None:
         distance = np.abs(level - np.median(level))
-        spread = 1.4826 * float(np.median(distance))
+        spread = MAD_FACTOR * float(np.median(distance))
         far_off = ~(distance <= LEVEL_LIMIT * spread) if spread > 0 else distance > 0
         return BadPixels(stuck, noisy, far_off)
     stuck_hot, noisy_hot = _by_noise(hot)

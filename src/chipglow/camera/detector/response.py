@@ -20,6 +20,7 @@ from chipglow.quantities.units import (
     WAVELENGTH,
 )
 from chipglow.radiometry import Band
+from chipglow.radiometry.band import PAPER_BAND
 
 RESPONSES: Final = Family("detector_response")
 """By their kind; other packages add theirs in the group ``chipglow.detector_response``."""
@@ -44,7 +45,7 @@ class ExposureSettings(Part):
 class OperationPoint(ExposureSettings):
     """How a camera uses its detector (EMVA 1288: the operation point)."""
 
-    band: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
+    band: Band = field(default_factory=lambda: Band(*PAPER_BAND))
     """With the relative spectral response."""
 
     @property

@@ -26,6 +26,7 @@ _NEAR: Final = 32
 """Range of a blur's change in widths of the point spread function."""
 
 _WIDTH_SQUARES: Final = 24
+"""Squares along the width of a point spread function for the width of its blur."""
 
 
 class BlurTerm(Part, ABC):

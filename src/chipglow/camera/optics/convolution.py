@@ -22,7 +22,11 @@ Grid: TypeAlias = tuple[Raster, Raster, float]
 """Samples and pixels of an image, and the pixels' fill factor."""
 
 _ROUNDING: Final = 1e-13
-_COLUMNS: Final = 32
+"""Part of an image's maximum below which values are rounding errors of transforms."""
+
+_COLUMNS_AT_ONCE: Final = 32
+"""Columns that a thread transforms at once."""
+
 _SMALL: Final = 2**16
 """Values of a field whose transform fits the processor's cache."""
 
@@ -159,7 +163,7 @@ class Convolution:
 
         # A block of this size stays in the processor's cache between the transforms. All of a small
         # field does, and takes less time than to start threads.
-        columns_at_once = _COLUMNS if field.size > _SMALL else lines.shape[1]
+        columns_at_once = _COLUMNS_AT_ONCE if field.size > _SMALL else lines.shape[1]
         in_blocks(lines.shape[1], convolve, columns_at_once)
         return np.asarray(fft.irfft(summed, n=shape[1], axis=1)[:, :columns])
 

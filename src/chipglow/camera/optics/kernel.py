@@ -13,8 +13,11 @@ from chipglow.quantities import Array
 LARGEST_KERNEL: Final = 4097
 """Largest number of squares along a side of a kernel."""
 
-_EQUAL: Final = 1e-9
-_INFINITE: Final = 1e9
+_ROUNDING: Final = 1e-9
+"""Relative difference of values that are equal but for rounding."""
+
+_FAR_AWAY: Final = 1e9
+"""Distance in widths of a point spread function that stands for infinity."""
 
 _STEPS: Final = 64
 """Table steps per radian of the shortest wave of the amplitude."""
@@ -74,7 +77,7 @@ def poisson_squares(
     """
     x, y = (spacing * (np.arange(-n, n + 2) - 0.5) for n in (columns, rows))
     if beyond:
-        x[[0, -1]], y[[0, -1]] = ([-_INFINITE * width, _INFINITE * width],) * 2
+        x[[0, -1]], y[[0, -1]] = ([-_FAR_AWAY * width, _FAR_AWAY * width],) * 2
     y = y[:, None]
     distance = np.sqrt(x**2 + y**2 + width**2)
     plain = np.arctan(x * y / (width * distance))
@@ -127,7 +130,7 @@ def _between(before, first, last, after, t):  # type: ignore[no-untyped-def]
 def peak(weights: Array) -> tuple[int, int]:
     """Return row and column of the largest value; of equal values, the most central."""
     # Values that differ by rounding are equal: the top of a disc is flat.
-    places = np.argwhere(weights >= weights.max() * (1 - _EQUAL))
+    places = np.argwhere(weights >= weights.max() * (1 - _ROUNDING))
     from_middle = np.hypot(*(places - places.mean(axis=0)).T)
     row, column = places[int(np.argmin(from_middle))].tolist()
     return row, column

@@ -33,20 +33,44 @@ PUPIL_ENERGY: Final = 0.99
 """Fraction of a pupil's light within `PupilPSF.kernel`; `PupilPSF.view_kernel` contains all."""
 
 _WAVELENGTHS: Final = 12
-_FINEST_PUPIL: Final = 256
+"""Wavelengths over which the light of a band is summed."""
+
+_FEWEST_SAMPLES: Final = 256
+"""Fewest samples along the diameter of a pupil."""
+
 _COARSEST_STEP: Final = 0.25
 """Largest phase step in rad between neighbouring samples of a pupil."""
 
-_LARGEST_PUPIL: Final = 1024
-_NEAR: Final = 100.0
-_FAR: Final = 300.0
-_TAIL: Final = 6.0
-_FINEST: Final = 2.0
-_PERIOD: Final = 3.0
+_MOST_SAMPLES: Final = 1024
+"""Most samples along the diameter; larger aberrations are refused."""
+
+_CORE_RADIUS: Final = 100.0
+"""Radius of the core, beyond which the mean of the rings is a tail, in units of wavelength / (2π
+numerical aperture)."""
+
+_LARGEST_RADIUS: Final = 300.0
+"""Largest radius to which a view extends the core, in the same unit."""
+
+_TAIL_FACTOR: Final = 6.0
+"""Length of the tail's transfer function in lengths of the tail."""
+
+_FREQUENCY_REACH: Final = 2.0
+"""Frequencies of a core in cut-off frequencies of the pupil."""
+
+_PERIODS: Final = 3.0
+"""Period of the discrete transform in sides of the core, so that its repetitions are far away."""
+
 _MAX_NOLL_INDEX: Final = 120
+"""Largest Noll index: all Zernike polynomials of the first 15 radial orders."""
+
 _MAX_RMS: Final = 1e-3
+"""Largest root mean square of an aberration in m."""
+
 _POINT: Final = 1e-12
+"""Radius of a disc that counts as a point."""
+
 _WIDTH_SQUARES: Final = 128
+"""Squares along half of the image from which a width is read."""
 
 
 def _zernike(value: Any) -> Any:
@@ -162,7 +186,7 @@ class PupilPSF(PointSpreadFunction):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self._samples > _LARGEST_PUPIL:
+        if self._samples > _MOST_SAMPLES:
             raise ValueError(
                 f"psf: defocus and aberrations have a slope of {self._slope:.3g} m per pupil "
                 "radius; the limit is some 10 wavelengths"
@@ -208,8 +232,8 @@ class PupilPSF(PointSpreadFunction):
     def _squares(self, spacing: float, rows: int, columns: int, beyond: bool) -> Array:
         """Return fractions of the light on squares; with `beyond`, border squares have the rest."""
         unit = self._shortest / (2 * pi * self.numerical_aperture)
-        near = _NEAR * unit + 2 * self._geometric
-        reach = max(near, min((max(rows, columns) + 0.5) * spacing, _FAR * unit))
+        near = _CORE_RADIUS * unit + 2 * self._geometric
+        reach = max(near, min((max(rows, columns) + 0.5) * spacing, _LARGEST_RADIUS * unit))
         half = half_size(reach, spacing)
         core = self._core(spacing, half)
         if beyond:
@@ -220,8 +244,8 @@ class PupilPSF(PointSpreadFunction):
 
     def _core(self, spacing: float, half: int) -> Array:
         """Return fractions of the light on squares, minus the tail."""
-        step = 1 / (_PERIOD * (2 * half + 1) * spacing)
-        count = ceil(_FINEST * 2 * self.numerical_aperture / self._shortest / step)
+        step = 1 / (_PERIODS * (2 * half + 1) * spacing)
+        count = ceil(_FREQUENCY_REACH * 2 * self.numerical_aperture / self._shortest / step)
         up = step * np.arange(-count, count + 1, dtype=np.float64)
         across = step * np.arange(count + 1, dtype=np.float64)
         frequency = np.hypot(across, up[:, None])
@@ -254,12 +278,12 @@ class PupilPSF(PointSpreadFunction):
     @property
     def _width(self) -> float:
         """Length b in m of the tail's transfer function; see `poisson_squares`."""
-        return _TAIL * self._tail * (1 - self.obscuration)
+        return _TAIL_FACTOR * self._tail * (1 - self.obscuration)
 
     @cached_property
     def _slope(self) -> float:
         """Largest slope of the path difference in m per radius of the pupil."""
-        x = np.linspace(-1.0, 1.0, _FINEST_PUPIL + 1)
+        x = np.linspace(-1.0, 1.0, _FEWEST_SAMPLES + 1)
         difference = self._path(x, x[:, None])
         steep = np.hypot(*np.gradient(difference, x[1] - x[0]))
         return float(steep[np.hypot(x, x[:, None]) <= 1.0].max())
@@ -273,7 +297,7 @@ class PupilPSF(PointSpreadFunction):
     def _samples(self) -> int:
         """Samples across a pupil, a power of two."""
         phase = 2 * pi * self._slope / self._shortest
-        return max(_FINEST_PUPIL, 1 << ceil(log2(max(2 * phase / _COARSEST_STEP, 1.0))))
+        return max(_FEWEST_SAMPLES, 1 << ceil(log2(max(2 * phase / _COARSEST_STEP, 1.0))))
 
     @property
     def _changes(self) -> Iterator[NDArray[np.complex128] | None]:

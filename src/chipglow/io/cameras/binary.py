@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from chipglow.camera import Recording
-from chipglow.camera.recording import Quantity
+from chipglow.camera.recording import SignalKind
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.grids.file_array import check_samples
 from chipglow.quantities import Array
@@ -20,6 +20,7 @@ from chipglow.radiometry import ObjectParameters
 from chipglow.text import Notes
 
 _TEN_YEARS: Final = 31_536_000.0 * 10
+"""Seconds of ten years: a camera's clock that shows less since 1970 was not set."""
 
 
 class CutShortError(SourceError):
@@ -102,7 +103,7 @@ class CameraFile(ABC):
     """Rows and columns of a picture."""
     complete: int
     """Number of whole frames."""
-    quantity: Quantity = "counts"
+    quantity: SignalKind = "counts"
     dtype: DTypeLike = np.uint16
 
     def __init__(self, binary: Binary, notes: Notes) -> None:

@@ -40,7 +40,10 @@ _SETUP: Final = layout(
 )
 _BLOCK: Final = np.dtype([("size", "<u4"), ("kind", "<u2"), ("more", "<u2")])
 _TIMES, _EXPOSURES = 1002, 1003
+
 _TICK: Final = 2.0**-32
+"""Unit of times in s."""
+
 _PACKED_10, _PACKED_12 = 256, 1024
 
 

@@ -40,11 +40,21 @@ _HEADER: Final = layout(
     64, magic=("S4", 0), version=("<u4", 20), place=("<u4", 24), count=("<u4", 28)
 )
 _ENTRY: Final = layout(32, kind=("<u2", 0), sort=("<u2", 2), offset=("<u4", 12), size=("<u4", 16))
+
 _MOST_RECORDS: Final = 1000
+"""Most records of a frame; more are a damaged file."""
+
 _RAW, _CAMERA = 1, 32
+
 _RAW_HEADER: Final = 32
+"""Bytes before the counts of a record."""
+
 _BIG_ENDIAN: Final = 1
+"""Sort of a record with big-endian numbers."""
+
 _MOST_PADDING: Final = 1 << 20
+"""Most bytes after the last frame that may be padding: 1 MiB."""
+
 _LARGE: Final = 100.0
 """An exponent that is possible, and no transmittance."""
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from chipglow.camera import Recording
-from chipglow.camera.recording import Quantity
+from chipglow.camera.recording import SignalKind
 from chipglow.io.cameras.cine import Cine
 from chipglow.io.cameras.flir import Flir, has_packed_counts
 from chipglow.io.cameras.hcc import Hcc
@@ -123,7 +123,7 @@ def read_recording(
     frames: slice | None = None,
     format: str | None = None,
     *,
-    quantity: Quantity | None = None,
+    quantity: SignalKind | None = None,
     unit: str | None = None,
     interval: float | None = None,
     dataset: str | None = None,

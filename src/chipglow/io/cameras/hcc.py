@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera import Recording
-from chipglow.camera.recording import Quantity
+from chipglow.camera.recording import SignalKind
 from chipglow.io import atomic_path
 from chipglow.io.cameras.binary import Binary, CameraFile, check_picture, layout
 from chipglow.io.sources import SourceError
@@ -34,11 +34,20 @@ _HEADER: Final = layout(
     resolution=("u1", 225),
     serial=("<u4", 248),
 )
-_EXPOSURE: Final = 1e-8
-_RATE: Final = 1e-3
-_SUBSECOND: Final = 1e-7
-_WITH_TIME: Final = 10
-_MODES: Final[dict[int, tuple[str, Quantity | None]]] = {
+
+_EXPOSURE_UNIT: Final = 1e-8
+"""Unit of the exposure in s."""
+
+_RATE_UNIT: Final = 1e-3
+"""Unit of the frame rate in Hz."""
+
+_SUBSECOND_UNIT: Final = 1e-7
+"""Unit of the fraction of a second in s."""
+
+_FIRST_WITH_TIME: Final = 10
+"""Major version from which headers state the time."""
+
+_MODES: Final[dict[int, tuple[str, SignalKind | None]]] = {
     0: ("raw", "counts"),
     255: ("raw", "counts"),
     1: ("corrected for non-uniformity", "counts"),
@@ -46,11 +55,22 @@ _MODES: Final[dict[int, tuple[str, Quantity | None]]] = {
     3: ("in-band radiance", "radiance"),
     4: ("in-band irradiance", None),
 }
+"""Name and quantity of each mode."""
+
 _WRITTEN_MODE: Final = {"counts": 0, "temperature": 2, "radiance": 3}
-_VERSION: Final = (12, 7)
-_MOST: Final = 65_535
-_GREATEST: Final = 1e30
+"""Mode of each quantity that is written."""
+
+_WRITTEN_VERSION: Final = (12, 7)
+"""Major and minor version of written files."""
+
+_LARGEST_COUNT: Final = 65_535
+"""Largest count and size: 16 bits."""
+
+_LARGEST_VALUE: Final = 1e30
+"""Values beyond cannot be scaled in single precision."""
+
 _LEAST_EXPONENT: Final = -100
+"""Smallest power of two of a count's value."""
 
 
 class Hcc(CameraFile):
@@ -114,7 +134,7 @@ class Hcc(CameraFile):
             return image
         scale: float = 2.0 ** header["data_exponent"]
         offset: float = header["data_offset"]
-        largest = _MOST * scale + abs(offset)
+        largest = _LARGEST_COUNT * scale + abs(offset)
         if not largest < np.finfo(np.float32).max:
             raise SourceError(
                 f"{self.path}: DataOffset and DataExp give {largest:g}, expected less"
@@ -123,15 +143,15 @@ class Hcc(CameraFile):
 
     def times(self, chosen: range) -> NDArray[np.float64]:
         first, headers = self.first, self._headers(chosen)
-        rate = first["rate"] * _RATE
-        if first["major"] < _WITH_TIME or not headers["seconds"].any():
+        rate = first["rate"] * _RATE_UNIT
+        if first["major"] < _FIRST_WITH_TIME or not headers["seconds"].any():
             return self.stamped(chosen, None, rate)
-        self.note_start(first["seconds"] + _SUBSECOND * first["subseconds"])
+        self.note_start(first["seconds"] + _SUBSECOND_UNIT * first["subseconds"])
         # Whole seconds first: their difference is exact.
         stamps = (
             headers["seconds"].astype(np.int64)
             - first["seconds"]
-            + _SUBSECOND * (headers["subseconds"].astype(np.int64) - first["subseconds"])
+            + _SUBSECOND_UNIT * (headers["subseconds"].astype(np.int64) - first["subseconds"])
         )
         return self.stamped(chosen, stamps, rate)
 
@@ -142,7 +162,7 @@ class Hcc(CameraFile):
         is_raw = first["mode"] in (0, 255) and 8 <= first["resolution"] <= 16
         return {
             "camera": f"Telops, serial number {first['serial']}" if first["serial"] else "Telops",
-            "integration_time": self.common_exposure(headers["exposure"] * _EXPOSURE),
+            "integration_time": self.common_exposure(headers["exposure"] * _EXPOSURE_UNIT),
             "saturation": 2.0 ** first["resolution"] - 2 if is_raw else None,
         }
 
@@ -169,10 +189,10 @@ def write_hcc(path: str | Path, recording: Recording) -> None:
     """
     target = Path(path)
     count, height, width = recording.signal.shape
-    if not 64 <= width <= _MOST or height > _MOST:
+    if not 64 <= width <= _LARGEST_COUNT or height > _LARGEST_COUNT:
         raise ValueError(
-            f"{target}: signal has {width} columns and {height} rows, Telops' HCC has 64 to {_MOST}"
-            f" columns and up to {_MOST} rows"
+            f"{target}: signal has {width} columns and {height} rows, Telops' HCC has 64 to "
+            f"{_LARGEST_COUNT} columns and up to {_LARGEST_COUNT} rows"
         )
     samples, exponent, offset = _samples(target, recording)
     headers = _headers(target, recording, width, height, count)
@@ -187,37 +207,38 @@ def write_hcc(path: str | Path, recording: Recording) -> None:
 def _samples(path: Path, recording: Recording) -> tuple[NDArray[np.uint16], int, float]:
     values = np.asarray(recording.signal, np.float64)
     low, high = float(values.min()), float(values.max())
-    if not (low > -_GREATEST and high < _GREATEST):
+    if not (low > -_LARGEST_VALUE and high < _LARGEST_VALUE):
         raise ValueError(
-            f"{path}: signal has values that are not finite or beyond {_GREATEST:g}, expected less"
+            f"{path}: signal has values that are not finite or beyond {_LARGEST_VALUE:g}, "
+            "expected less"
         )
     if recording.quantity == "counts":
-        if low < 0 or high > _MOST or (values != np.round(values)).any():
+        if low < 0 or high > _LARGEST_COUNT or (values != np.round(values)).any():
             raise ValueError(
                 f"{path}: counts go from {low:g} to {high:g}, expected whole numbers from 0 to "
-                f"{_MOST}"
+                f"{_LARGEST_COUNT}"
             )
         return values.astype(np.uint16), 0, 0.0
     # The header keeps the offset in 32 bits, rounded down here so that no sample is under 0.
     offset = float(np.nextafter(np.float32(low), np.float32(-np.inf)))
-    exponent = max(ceil(log2((high - offset) / _MOST)), _LEAST_EXPONENT)
+    exponent = max(ceil(log2((high - offset) / _LARGEST_COUNT)), _LEAST_EXPONENT)
     return np.round((values - offset) / 2.0**exponent).astype(np.uint16), exponent, offset
 
 
 def _headers(path: Path, recording: Recording, width: int, height: int, count: int) -> NDArray[Any]:
     # A camera's clock never shows 0 seconds: readers take that for a header without time.
-    ticks = np.round(recording.times / _SUBSECOND).astype(np.int64) + 10_000_000
+    ticks = np.round(recording.times / _SUBSECOND_UNIT).astype(np.int64) + 10_000_000
     steps = np.diff(recording.times)
     if ticks.min() < 10_000_000 or (np.diff(ticks) <= 0).any() or ticks.max() >= 10_000_000 * 2**32:
         raise ValueError(f"{path}: times do not ascend from 0 in steps of 0.1 us or more")
     headers = np.zeros(count, _HEADER)
     headers["signature"] = b"TC"
-    headers["major"], headers["minor"] = _VERSION
+    headers["major"], headers["minor"] = _WRITTEN_VERSION
     headers["frame"] = np.arange(count)
     headers["width"], headers["height"] = width, height
     headers["mode"] = _WRITTEN_MODE[recording.quantity]
-    headers["exposure"] = round((recording.integration_time or 0.0) / _EXPOSURE)
-    headers["rate"] = round(min(1 / (np.median(steps) * _RATE), 2**32 - 1)) if count > 1 else 0
+    headers["exposure"] = round((recording.integration_time or 0.0) / _EXPOSURE_UNIT)
+    headers["rate"] = round(min(1 / (np.median(steps) * _RATE_UNIT), 2**32 - 1)) if count > 1 else 0
     headers["seconds"], headers["subseconds"] = np.divmod(ticks, 10_000_000)
     saturation = recording.saturation
     if saturation is not None and 8 <= log2(saturation + 2) <= 16 and log2(saturation + 2) % 1 == 0:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera import Recording
-from chipglow.camera.recording import Quantity
+from chipglow.camera.recording import SignalKind
 from chipglow.io.cameras.binary import chosen_frames, evenly
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.conventions import note_other_unit
@@ -41,7 +41,7 @@ from chipglow.scene import Raster
 from chipglow.text import Notes
 
 _COUNTS: Final = ("count", "counts", "dn", "dl", "adu")
-_BASES: Final[tuple[tuple[Quantity, str], ...]] = (("temperature", "K"), ("radiance", "W/m^2/sr"))
+_BASES: Final[tuple[tuple[SignalKind, str], ...]] = (("temperature", "K"), ("radiance", "W/m^2/sr"))
 _EXPECTED: Final = "counts, W/m2/sr, K, degC, degF, cK or another unit of radiance or temperature"
 _SQUARE: Final = 0.01
 """Relative difference of columns and rows up to which pixels are square."""
@@ -51,7 +51,7 @@ class MissingError(SourceError):
     """A value is needed that neither the file nor the user states."""
 
 
-def recording_unit(text: str) -> tuple[Quantity, Unit] | None:
+def recording_unit(text: str) -> tuple[SignalKind, Unit] | None:
     """Return the quantity of samples with a unit, and the unit; None if it is of neither."""
     if text.strip().lower() in _COUNTS:
         return "counts", Unit(1.0, text=text)
@@ -66,7 +66,7 @@ class Stated(ArrayNumbers):
     """Statements of the user on a file without them; see `read_recording`."""
 
     quantity: Annotated[
-        Quantity | None,
+        SignalKind | None,
         Parameter(
             "Quantity of the numbers, for files that do not state it.",
             allowed="none, counts, radiance, temperature",
@@ -240,7 +240,7 @@ def _is_temperature(stated: Stated) -> bool:
     return stated.quantity in (None, "temperature") and (unit is None or unit[0] == "temperature")
 
 
-def _unit(one: FileArray, stated: Stated, notes: Notes) -> tuple[Quantity, Unit] | None:
+def _unit(one: FileArray, stated: Stated, notes: Notes) -> tuple[SignalKind, Unit] | None:
     """Return quantity and unit of the samples, as the user or the file says; None if neither."""
     if stated.unit is not None:
         found = recording_unit(stated.unit)
@@ -280,7 +280,7 @@ def _signal(
 
 
 def _in_si(
-    one: FileArray, signal: NDArray[Any], quantity: Quantity, known: Unit, stated: Stated
+    one: FileArray, signal: NDArray[Any], quantity: SignalKind, known: Unit, stated: Stated
 ) -> NDArray[Any]:
     """Return samples as a `Recording` has them; refuse temperatures that cannot be."""
     if quantity == "counts":

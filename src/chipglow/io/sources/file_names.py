@@ -27,7 +27,9 @@ _NUMBERS: Final = tuple(
 
 _YEAR_LAST: Final = re.compile(r"(0[1-9]|[12]\d|3[01])(0[1-9]|[12]\d|3[01])(19|20)\d\d", re.ASCII)
 _WHOLE: Final = re.compile(r"[+-]?\d+", re.ASCII)
+
 _LARGEST_COUNT: Final = 10_000_000
+"""Largest number in the names of a series of files."""
 
 
 def natural(name: str) -> tuple[tuple[int, str], ...]:

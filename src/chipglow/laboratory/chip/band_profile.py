@@ -58,8 +58,11 @@ _DEEP: Final = 40.0
 _DEEP_FRACTION: Final = 1.0 / 3.0
 """Nor is it as large a fraction of the range of the temperature along the band."""
 
-_STEP: Final = 0.5
-_FINE: Final = 4
+_POINT_DISTANCE: Final = 0.5
+"""Distance of a curve's points in pixels: two for each pixel."""
+
+_LINES_PER_PIXEL: Final = 4
+"""Parallel lines for each pixel of the width over which a profile is averaged."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -291,7 +294,7 @@ def _given(curve: Array, tool: Tool, pitch: float) -> Line:
     corners = first + arc_length(curve)
     if (np.diff(corners) <= 0).any():
         raise ValueError("curve: two points are the same, expected each apart from the one before")
-    steps = max(round((corners[-1] - first) / (_STEP * pitch)), 2)
+    steps = max(round((corners[-1] - first) / (_POINT_DISTANCE * pitch)), 2)
     distance = np.linspace(first, corners[-1], steps + 1)
     columns = [np.interp(distance, corners, curve[:, axis]) for axis in (0, 1)]
     return Line(distance, np.stack(columns, axis=1))
@@ -320,7 +323,7 @@ def _common(lines: Sequence[Line | None], pitch: float) -> Array:
     """Return distances that cover all lines, at steps of half a pixel."""
     first = min(float(line.distance[0]) for line in lines if line)
     last = max(float(line.distance[-1]) for line in lines if line)
-    step = _STEP * pitch
+    step = _POINT_DISTANCE * pitch
     return step * np.arange(np.ceil(first / step - 1e-6), np.floor(last / step + 1e-6) + 1)
 
 
@@ -392,7 +395,7 @@ def _read(
         return rows
     curve = points[there]
     tangent = normals_of(curve)[:, ::-1] * [-1.0, 1.0]
-    count = max(round(width / pitch * _FINE), 1)
+    count = max(round(width / pitch * _LINES_PER_PIXEL), 1)
     places = across_curve(curve, width * ((np.arange(count) + 0.5) / count - 0.5))
     frame = measurement.data["radiance_temperature"][number].values
     mean, *calibration = (

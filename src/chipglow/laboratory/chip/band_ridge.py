@@ -30,15 +30,39 @@ SHORTEST: Final = 15.0
 """Smallest length of a band's ridge in pixels."""
 
 _SCALES: Final = (6e-6, 12e-6, 18e-6)
-_ALONG_THE_FACE: Final = (10.0, 30.0)
-_STRENGTH: Final = 5.0
-_STEP: Final = 0.5
-_GAP: Final = 10.0
-_SEARCH: Final = 1.5
-_SIDES: Final = 10.0
-_FINE: Final = 4
+"""Standard deviations in m of the Gaussians whose second derivatives detect ridges: for bands of
+different widths."""
+
+_FACE_ANGLES: Final = (10.0, 30.0)
+"""Angles to the rake face in degrees up to which a ridge does not count, and from which it counts
+in full."""
+
+_RESPONSE_SCALE: Final = 5.0
+"""Response in K beyond which a score grows by the logarithm, so that no single hot place decides.
+"""
+
+_POINT_DISTANCE: Final = 0.5
+"""Distance of a ridge's points in pixels: two for each pixel."""
+
+_LONGEST_GAP: Final = 10.0
+"""Longest gap of a ridge in pixels."""
+
+_CLIMB_REACH: Final = 1.5
+"""Distance in pixels, to each side, at which a point of the ridge looks for the maximum."""
+
+_SIDE_REACH: Final = 10.0
+"""Distance in pixels, to each side, at which a ridge is compared with its surroundings."""
+
+_SAMPLES_PER_PIXEL: Final = 4
+"""Samples for each pixel of the profiles across a ridge."""
+
 _CLIMB_BLUR: Final = (2.0, 4.0)
+"""Standard deviations of the Gaussian that smooths the profiles, in points along the ridge and in
+samples across."""
+
 _NOISE_FACTOR: Final = 3.0
+"""Smallest height of a ridge in standard deviations of the noise."""
+
 _NO_RIDGE: Final = "shear band: the radiance temperature has no ridge"
 
 
@@ -112,8 +136,8 @@ def _ridge(image: ThermalImage, tool: Tool, response: Array) -> Line:
     points = _path(image, response, tool)
     coefficients = spline_filter(image.temperature, order=3)
     for _ in range(3):
-        points = climbed(points, *_profiles(points, image, coefficients, _SEARCH))
-        points = even_steps(points, _STEP * image.raster.spacing)
+        points = climbed(points, *_profiles(points, image, coefficients, _CLIMB_REACH))
+        points = even_steps(points, _POINT_DISTANCE * image.raster.spacing)
     points = _within(points, image)
     _check(points, image, coefficients)
     return Line(arc_length(points) + float(np.hypot(*(points[0] - tool.edge_point))), points)
@@ -145,9 +169,7 @@ def _response(image: ThermalImage, tool: Tool) -> Array:
         least = mean - np.hypot(half, both)
         turn = 0.5 * np.arctan2(-both, half) + np.pi / 2
         off_face = np.degrees(np.arcsin(np.clip(abs(np.cos(turn) * x + np.sin(turn) * y), 0, 1)))
-        fraction = np.clip(
-            (off_face - _ALONG_THE_FACE[0]) / (_ALONG_THE_FACE[1] - _ALONG_THE_FACE[0]), 0, 1
-        )
+        fraction = np.clip((off_face - _FACE_ANGLES[0]) / (_FACE_ANGLES[1] - _FACE_ANGLES[0]), 0, 1)
         best = np.maximum(best, fraction * width**2 * np.maximum(-least, 0.0))
     return best
 
@@ -158,12 +180,12 @@ def _path(image: ThermalImage, response: Array, tool: Tool) -> Array:
     allowed &= polar.on_raster & polar.off_face
     if not allowed.any():
         raise NoShearBandError("shear band: no usable pixel is beside the tool")
-    score = np.log1p(map_coordinates(response, polar.index, order=1) / _STRENGTH)
+    score = np.log1p(map_coordinates(response, polar.index, order=1) / _RESPONSE_SCALE)
     if allowed[0].any():
         i, j = polar.best_path(score, allowed, allowed, anywhere=False)
         points = polar.points[i, j]
         # It begins where the ridge does: near the edge the heat of the rake face may hide it.
-        points = points[strongest_part(points, score[i, j], _GAP * image.raster.spacing)]
+        points = points[strongest_part(points, score[i, j], _LONGEST_GAP * image.raster.spacing)]
         if arc_length(points)[-1] >= SHORTEST * image.raster.spacing:
             return points
     i, j = polar.best_path(score, allowed, allowed, anywhere=True)
@@ -176,8 +198,10 @@ def _profiles(
     points: Array, image: ThermalImage, coefficients: Array, reach: float
 ) -> tuple[Array, Array]:
     """Return offsets in m up to a reach in pixels, and the smoothed temperature across points."""
-    count = ceil(reach * _FINE)
-    offsets = image.raster.spacing / _FINE * np.arange(-count, count + 1, dtype=np.float64)
+    count = ceil(reach * _SAMPLES_PER_PIXEL)
+    offsets = (
+        image.raster.spacing / _SAMPLES_PER_PIXEL * np.arange(-count, count + 1, dtype=np.float64)
+    )
     index = image.raster.index(across_curve(points, offsets))
     values = map_coordinates(coefficients, index, order=3, mode="nearest", prefilter=False)
     return offsets, gaussian_filter(values, _CLIMB_BLUR, mode="nearest")
@@ -198,7 +222,7 @@ def _check(points: Array, image: ThermalImage, coefficients: Array) -> None:
             f"shear band: the longest ridge of the radiance temperature is {length:.3g} pixels "
             f"long, expected {SHORTEST:g} or more"
         )
-    _, profiles = _profiles(points, image, coefficients, _SIDES)
+    _, profiles = _profiles(points, image, coefficients, _SIDE_REACH)
     middle = profiles.shape[1] // 2
     sides = np.maximum(profiles[:, : middle + 1].min(axis=1), profiles[:, middle:].min(axis=1))
     height = float(np.median(profiles[:, middle] - sides))

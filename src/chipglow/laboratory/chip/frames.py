@@ -31,7 +31,7 @@ def frame_numbers(frames: Sequence[int] | None, count: int) -> NDArray[np.int64]
     return numbers
 
 
-def changed(estimate: Estimate, change: Callable[[Array], Array]) -> Estimate:
+def linearly_changed(estimate: Estimate, change: Callable[[Array], Array]) -> Estimate:
     """Return an estimate of which a linear change is made to the values and to every effect."""
     components = []
     for one in estimate.components:
@@ -48,7 +48,7 @@ def frame_mean(estimate: Estimate) -> Estimate:
     def mean(values: Array) -> Array:
         return quotient(np.where(known, values, 0.0).sum(axis=0), count)
 
-    return changed(estimate, mean)
+    return linearly_changed(estimate, mean)
 
 
 def frame_scatter(frames: Array) -> Component:

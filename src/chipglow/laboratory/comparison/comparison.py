@@ -20,7 +20,7 @@ from chipglow.laboratory.chip import (
     rake_grid,
 )
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN, POSITION
-from chipglow.laboratory.chip.frames import FRAMES, changed, frame_mean, frame_scatter
+from chipglow.laboratory.chip.frames import FRAMES, frame_mean, frame_scatter, linearly_changed
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
 from chipglow.laboratory.comparison.coverage import COVERAGE
@@ -43,9 +43,16 @@ AGREEING: Final = "values_with_E_n_up_to_1"
 """Column of the number of values that agree."""
 
 _DRAWS: Final = 4000
+"""Draws of the errors from which the probability of each simulation follows."""
+
 _SEED: Final = 2010
-_FEW: Final = 3
+"""Seed of the draws, so that the same files give the same numbers."""
+
+_FEWEST_VALUES: Final = 3
+"""Fewest frames, and fewest places, that can be compared."""
+
 _SAME_ANGLE: Final = radians(0.1)
+"""Angle in rad between two rake faces that count as the same, if no uncertainty is stated."""
 
 
 def normalised_error(measured: Estimate, simulated: Estimate) -> Array:
@@ -304,7 +311,7 @@ def _compare_grid(
     except ValueError as error:
         notes.warnings.append(f"The rake face is left out: {error}.")
         return None
-    if grids[0].times.size < _FEW:
+    if grids[0].times.size < _FEWEST_VALUES:
         notes.warnings.append(_few_frames("measured", grids[0].times.size))
     columns = min(grid.along.size for grid in grids)
     base, *others = grids
@@ -422,7 +429,7 @@ def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Es
     if not used.any():
         notes.warnings.append(f"{name}: No frame has a band that is in place; all frames are used.")
         used = np.ones(used.size, np.bool_)
-    elif used.sum() < _FEW:
+    elif used.sum() < _FEWEST_VALUES:
         notes.warnings.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
 
     def read(field: Array) -> Array:
@@ -430,7 +437,7 @@ def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Es
         ends = {"left": np.nan, "right": np.nan}
         return np.stack([np.interp(distance, profile.distance, row, **ends) for row in field[used]])
 
-    frames = changed(profile.estimate.without(POSITION), read)
+    frames = linearly_changed(profile.estimate.without(POSITION), read)
     # The curve's place does not change from frame to frame: it is as uncertain in their mean.
     position = frame_mean(Estimate(read(profile.estimate.contribution(POSITION))))
     mean = frame_mean(frames)

@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from chipglow.laboratory.comparison.comparison import Comparison
 
 _HEIGHT: Final = 5.2
-_ASIDE: Final = 0.2
+"""Height of the figure in inches."""
+
+_BAR_DISTANCE: Final = 0.2
+"""Distance of the bars of two simulations, in steps of the axis."""
 
 
 def draw_comparison(comparison: "Comparison") -> Figure:
@@ -72,7 +75,7 @@ def _draw_differences(axes: Axes, place: Array, readings: Sequence[Estimate]) ->
     step = float(np.median(np.diff(1e6 * place))) if place.size > 1 else 0.0
     for i, reading in enumerate(simulated):
         # Beside one another, so that no bar hides another.
-        aside = _ASIDE * step * (i - (len(simulated) - 1) / 2)
+        aside = _BAR_DISTANCE * step * (i - (len(simulated) - 1) / 2)
         axes.errorbar(
             1e6 * place + aside,
             reading.values - measured.values,

@@ -20,9 +20,17 @@ if TYPE_CHECKING:
     from chipglow.laboratory.emissivity.temperature import RegionTemperatures
 
 _PANEL_WIDTH: Final = 2.7
-_AROUND: Final = 0.75
-_LINES: Final = 2.6
-_SLENDER: Final = 3.0
+"""Width of an image in inches."""
+
+_LABEL_HEIGHT: Final = 0.75
+"""Height in inches of title and labels of an image."""
+
+_LINES_HEIGHT: Final = 2.6
+"""Height in inches of the panel of lines."""
+
+_SLENDERNESS: Final = 3.0
+"""Height over width of a region from which its name is written upright."""
+
 _BESIDE: Final = 0.2
 """Margin beside the first and the last region, in widths of the axes."""
 _BACKGROUND: Final = 0.1
@@ -36,10 +44,12 @@ def draw_emissivity(
 ) -> Figure:
     """Draw the radiance temperature with the regions, and the emissivity."""
     raster = found.raster
-    height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, 1.0), 5.0) + _AROUND
+    height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, 1.0), 5.0) + _LABEL_HEIGHT
     with drawing.style():
-        figure = drawing.new_figure(height + (_LINES if lines else 0.0))
-        parts: Any = figure.subfigures(2, 1, height_ratios=(height, _LINES)) if lines else (figure,)
+        figure = drawing.new_figure(height + (_LINES_HEIGHT if lines else 0.0))
+        parts: Any = (
+            figure.subfigures(2, 1, height_ratios=(height, _LINES_HEIGHT)) if lines else (figure,)
+        )
         left, right = parts[0].subplots(1, 2, sharey=True)
         draw_heated(parts[0], left, found, regions, "heated object", named=True)
         _emissivity_panel(found).draw(parts[0], right, raster)
@@ -141,7 +151,7 @@ def _draw_regions(axes: Axes, regions: Sequence[Region], raster: Raster, named: 
             # At its centre, upright where the region is slender.
             width, height = np.ptp(outline, axis=0)
             x, y = (outline.min(axis=0) + outline.max(axis=0)) / 2 * 1e6
-            turn = 90 if height > _SLENDER * width else 0
+            turn = 90 if height > _SLENDERNESS * width else 0
             axes.text(
                 x, y, region.name, rotation=turn, ha="center", va="center", fontsize=8,
                 color=colour, path_effects=[withStroke(linewidth=2.5, foreground="white")],

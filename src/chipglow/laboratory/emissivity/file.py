@@ -43,8 +43,13 @@ _FIELDS: Final[Mapping[str, str]] = {
     "tool": "tool",
 }
 _CHIP: Final = "measured chip"
+
 _DIGITS: Final = 4
+"""Decimals of an emissivity in a study, beyond what any is known to."""
+
 _GREATEST_DEVIATION: Final = 0.5
+"""Largest standard deviation of an emissivity that a study accepts."""
+
 _HEATING: Final = ("reflected", "reference_uncertainty", "reflected_uncertainty")
 
 

@@ -44,10 +44,19 @@ TEMPERATURE_BUDGET: Final = (*COMMON, "emissivity", "drift", UNIFORMITY, "repeat
 FAR: Final = 50.0
 """Difference of temperature in K beyond which an emissivity may well differ."""
 
-_STEP: Final = 0.5
-_STEPS: Final = 200
-_ROUNDS: Final = 4
+_SLOPE_STEP: Final = 0.5
+"""Half the step in K over which the slope of a radiance is taken."""
+
+_TEMPERATURES_TRIED: Final = 200
+"""Temperatures at which the radiance by a line is compared with the measured one, before it is
+solved."""
+
+_ITERATIONS: Final = 4
+"""Iterations of temperature and the emissivity that depends on it."""
+
 _SEED: Final = 2010
+"""Seed of the draws, so that the same files give the same numbers."""
+
 _LIMITS: Final = (Limits("emissivity", 0.0, 1.0), Limits("radiance", 0.0), Limits("reflected", 0.0))
 
 
@@ -363,7 +372,7 @@ def _modelled(
 ) -> Array:
     """Return true temperatures in K; the emissivity in 1/K has a slope, and its value at `at`."""
     found = np.full_like(radiance, at)
-    for _ in range(_ROUNDS if slope else 1):
+    for _ in range(_ITERATIONS if slope else 1):
         found = _temperature(emissivity + slope * (found - at), reflected, band, radiance)
     return np.where(np.isnan(found), inf, found)  # too little emissivity for any temperature
 
@@ -374,8 +383,8 @@ def _derivatives(
     """Derive the temperature by emissivity, radiance and temperature of the surroundings."""
     # `Band.slope` ends with its table.
     kelvins = np.array([reflected, at])
-    low, high = (band.radiance(kelvins + step) for step in (-_STEP, _STEP))
-    (room, own), (room_rise, rise) = band.radiance(kelvins), (high - low) / (2 * _STEP)
+    low, high = (band.radiance(kelvins + step) for step in (-_SLOPE_STEP, _SLOPE_STEP))
+    (room, own), (room_rise, rise) = band.radiance(kelvins), (high - low) / (2 * _SLOPE_STEP)
     whole = emissivity * rise
     if len(line.heatings) > 1:
         whole += line.slope * (own - room)
@@ -399,7 +408,7 @@ def _emissivity_of_area(
         black = band.radiance(np.asarray(temperature, np.float64))
         return np.asarray(line.at(temperature).values * (black - room) - (radiance - room))
 
-    kelvins = np.geomspace(reflected, HOTTEST, _STEPS)
+    kelvins = np.geomspace(reflected, HOTTEST, _TEMPERATURES_TRIED)
     hotter = np.flatnonzero(excess(kelvins) > 0)
     if not hotter.size:
         raise ValueError(

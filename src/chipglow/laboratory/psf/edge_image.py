@@ -18,14 +18,29 @@ from chipglow.quantities import Array, Brief
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 from chipglow.text import Notes
+from chipglow.uncertainty.component import MAD_FACTOR
 
 _LEAST_STEP: Final = 7.0
+"""Smallest step of an edge in its standard uncertainties."""
+
 _OUTLIER: Final = 7.0
+"""Residual of an outlier in standard deviations: fewer than one of 10¹¹ normal ones."""
+
 _SECOND_EDGE: Final = 0.12
-_BLOCK: Final = 5
-_ROUGHLY: Final = 1e-5
+"""Residual of a block over the step, from which there may be a second edge."""
+
+_BLOCK_SIDE: Final = 5
+"""Side in pixels of the blocks over which residuals are averaged."""
+
+_COARSE_TOLERANCE: Final = 1e-5
+"""Relative change of the sum of squares at which the fit that finds outliers ends."""
+
 _LEAST_PILE: Final = 10
+"""Fewest pixels of the largest value that show a limit of the range."""
+
 _MANY_CLIPPED: Final = 0.02
+"""Fraction of clipped pixels of a distance from the edge, above which this distance is left out."""
+
 _WHOLE_SQUARE: Final = "The whole square of a pixel takes light (fill factor 1)."
 
 
@@ -215,7 +230,7 @@ def _pixels_of(image: EdgeImage, line: EdgeLine) -> EdgePixels:
 
 def _quick_fit(pixels: EdgePixels) -> ModelFit:
     """Return a Gaussian fitted to the pixels."""
-    return fit_model(GaussianModel(), [pixels], tolerance=_ROUGHLY)
+    return fit_model(GaussianModel(), [pixels], tolerance=_COARSE_TOLERANCE)
 
 
 def _check_edge(pixels: EdgePixels, quick: ModelFit) -> None:
@@ -291,7 +306,7 @@ def _chosen(pixels: EdgePixels, kept: NDArray[np.bool_]) -> EdgePixels:
 def _without_outliers(pixels: EdgePixels, quick: ModelFit) -> tuple[EdgePixels, list[str]]:
     """Return the pixels without those that lie far from all others as near to the edge."""
     left = pixels.radiance - quick.predicted(0, pixels)
-    spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
+    spread = MAD_FACTOR * float(np.median(np.abs(left - np.median(left))))
     kept = np.abs(left) <= max(_OUTLIER * spread, 0.2 * quick.edges[0].step)
     lost = int(np.count_nonzero(~kept))
     # More than a few are not dead pixels but an object that is not an edge.
@@ -308,11 +323,11 @@ def _check_single(pixels: EdgePixels, quick: ModelFit) -> None:
     row = np.round((pixels.y - pixels.y.min()) / pixels.pitch).astype(np.int64)
     total, count = np.zeros((2, row.max() + 1, column.max() + 1))
     total[row, column], count[row, column] = left, 1.0
-    weight = uniform_filter(count, _BLOCK, mode="constant")
-    mean = uniform_filter(total, _BLOCK, mode="constant") / np.maximum(weight, 1e-9)
+    weight = uniform_filter(count, _BLOCK_SIDE, mode="constant")
+    mean = uniform_filter(total, _BLOCK_SIDE, mode="constant") / np.maximum(weight, 1e-9)
     fraction = np.abs(np.where(weight > 0.5, mean, 0.0)) / quick.edges[0].step
     change = np.diff(total, axis=1)[(count[:, 1:] * count[:, :-1]) > 0]
-    noise = float(np.median(np.abs(change))) / (_BLOCK * quick.edges[0].step)
+    noise = float(np.median(np.abs(change))) / (_BLOCK_SIDE * quick.edges[0].step)
     if fraction.max() > max(_SECOND_EDGE, 7 * noise):
         where = np.unravel_index(int(np.argmax(fraction)), fraction.shape)
         raise NoEdgeError(

@@ -8,13 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.quantities import Array
+from chipglow.uncertainty.component import MAD_FACTOR
 
 _LEAST_SIGNIFICANCE: Final = 50.0
 """Square of Student's t of a step that is taken for an edge; the best of noise reaches about 20."""
+
 _LEAST_PIXELS: Final = 10
-_WINDOW: Final = 6
-_ROUNDS: Final = 4
+"""Fewest pixels on each side of a line that may be an edge."""
+
+_WINDOW_PIXELS: Final = 6
+"""Distance in pixels from the line at which the window of the derivative (Hamming's) ends."""
+
+_ITERATIONS: Final = 4
+"""Iterations of a line and its window, and of a line and its outliers."""
+
 _OUTLIER: Final = 3.5
+"""Residual of an outlier in standard deviations: one of 2,000 normal ones."""
 
 
 class NoEdgeError(ValueError):
@@ -100,7 +109,7 @@ def _refined(
     pitch = abs(float(along[1] - along[0]))
     middles = (along[:-1] + along[1:]) / 2
     derivative = np.diff(rows, axis=1)
-    for _ in range(_ROUNDS):
+    for _ in range(_ITERATIONS):
         a, b = cos(line.normal), sin(line.normal)
         here, there = (b, a) if steep else (a, b)
         expected = (line.position - there * other) / here
@@ -120,7 +129,7 @@ def _centroids(
     derivative: Array, middles: Array, other: Array, expected: Array, pitch: float
 ) -> tuple[Array, Array]:
     """Return the centroids of the derivative near the line, of rows that show all of it."""
-    off = (middles[None, :] - expected[:, None]) / (_WINDOW * pitch)
+    off = (middles[None, :] - expected[:, None]) / (_WINDOW_PIXELS * pitch)
     window = np.where(np.abs(off) <= 1, 0.54 + 0.46 * np.cos(pi * off), 0.0)
     known = np.isfinite(derivative) | (window == 0.0)
     whole = known.all(axis=1) & (
@@ -135,11 +144,11 @@ def _centroids(
 def _without_outliers(place: Array, centre: Array) -> NDArray[np.bool_]:
     """Return which centroids lie near their line, by the median of their distances."""
     kept = np.ones(place.size, dtype=np.bool_)
-    for _ in range(_ROUNDS):
+    for _ in range(_ITERATIONS):
         if kept.sum() < 8:
             break
         residual = centre - np.polyval(np.polyfit(place[kept], centre[kept], 1), place)
-        spread = 1.4826 * float(np.median(np.abs(residual[kept])))
+        spread = MAD_FACTOR * float(np.median(np.abs(residual[kept])))
         kept = np.abs(residual) <= max(_OUTLIER * spread, 1e-12)
     return kept
 

@@ -10,9 +10,17 @@ from chipglow.laboratory.psf.psf_models import footprint_transfer
 from chipglow.quantities import Array
 
 BINS_PER_PITCH: Final = 4
+"""Bins for each pixel pitch of an edge-spread function, as in ISO 12233."""
+
 _WINDOW_PITCHES: Final = 10.0
+"""Distance from the edge in pixel pitches within which the line-spread function is transformed, at
+least."""
+
 _WINDOW_WIDTHS: Final = 5.0
+"""The same distance in widths of the line-spread function."""
+
 _FREQUENCIES: Final = 65
+"""Spatial frequencies of an MTF, from 0 to one over the pitch."""
 
 
 def edge_curves(fit: ModelFit, index: int, pixels: EdgePixels) -> xr.Dataset:

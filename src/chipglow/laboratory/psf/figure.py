@@ -19,14 +19,19 @@ from chipglow.scene.figures import ImagePanel, length_unit
 if TYPE_CHECKING:
     from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge
 
-_HEIGHT: Final = 5.6
-_APERTURES: Final = 2.6
+_EDGE_HEIGHT: Final = 5.6
+"""Height in inches of an edge's panels."""
+
+_APERTURES_HEIGHT: Final = 2.6
+"""Height in inches of the panel of apertures."""
+
 _SHOWN_WIDTHS: Final = 5.0
+"""Distance from the edge that is shown, in widths of the line-spread function."""
 
 
 def draw_knife_edge(found: "KnifeEdge") -> Figure:
     """Draw each image, the edge-spread function with fit and residuals, and the MTF."""
-    heights = [_HEIGHT] * len(found.edges) + ([_APERTURES] if found.apertures else [])
+    heights = [_EDGE_HEIGHT] * len(found.edges) + ([_APERTURES_HEIGHT] if found.apertures else [])
     with drawing.style():
         figure = drawing.new_figure(sum(heights) + 0.4)
         width = uncertain_text(found.fwhm * 1e6, found.fwhm_uncertainty * 1e6)

@@ -62,17 +62,40 @@ OVAL: Final = "psf oval"
 _MOST_OVAL: Final = 2.0
 """Ratio of the axes of such an oval, at most."""
 
-_ROUGHLY: Final = 1e-6
+_COARSE_TOLERANCE: Final = 1e-6
+"""Relative change of the sum of squares at which the fits that choose a model end."""
+
 _NOISE_ALONE: Final = 1.6
-_BY_CHANCE: Final = 0.01
-_TRIES: Final = 6
+"""Reduced chi-squared up to which residuals count as noise."""
+
+_CHANCE_LEVEL: Final = 0.01
+"""Probability of a chi-squared below which a model does not describe the edges."""
+
+_STARTS: Final = 6
+"""Starts of a fit whose residuals are not noise: clipping leads to several minima."""
+
 _APERTURES_APART: Final = 4.0
-_NOTHING: Final = 5e-4
-_PLATEAU: Final = 3.0
+"""Mean squared residual of the apertures, in their uncertainties, from which they contradict the
+edges."""
+
+_NEGLIGIBLE: Final = 5e-4
+"""Residual over the step below which a misfit is negligible, even if it is significant."""
+
+_PLATEAU_WIDTHS: Final = 3.0
+"""Shortest side of an edge in widths of the line-spread function; tails and brightness of a shorter
+one cannot be distinguished."""
+
 _UNRESOLVED: Final = 0.3
+"""Width of the optics over the pixel below which the pixel hides it."""
+
 _ALIGNED: Final = np.pi / 9
+"""Tilt in rad of two edges up to which they lie along rows or columns."""
+
 _SAMPLES_PER_WIDTH: Final = 10
-_NO_WEIGHT: Final = 1e-6
+"""Samples of a width of the point spread function, for its uncertainty."""
+
+_LEAST_WEIGHT: Final = 1e-6
+"""Weight of a model up to which its difference from the best is left out."""
 
 _Kernel = Callable[..., Array]
 
@@ -143,8 +166,8 @@ class KnifeEdge:
         """Whether the best model leaves what noise does in less than one of a hundred edges."""
         bins = sum(edge.curves["distance"].size for edge in self.edges)
         free = max(bins - self.best.free, 1)
-        chance = float(chdtri(free, _BY_CHANCE)) / free
-        return self.best.reduced_chi_squared > chance and max(map(_left, self.edges)) > _NOTHING
+        chance = float(chdtri(free, _CHANCE_LEVEL)) / free
+        return self.best.reduced_chi_squared > chance and max(map(_left, self.edges)) > _NEGLIGIBLE
 
     def to_frame(self) -> pd.DataFrame:
         """Return the models; one row each, the best first."""
@@ -234,10 +257,12 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     signals = aperture_signals(apertures, images[0].footprint) if apertures else None
     models, oval = _models(images, edges, notes)
     notes += Notes([text for image in images for text in image.notes.assumed])
-    first = [fit_model(model, edges, signals, tolerance=_ROUGHLY) for model in models]
+    first = [fit_model(model, edges, signals, tolerance=_COARSE_TOLERANCE) for model in models]
     if min(fit.reduced_chi_squared for fit in first) > _NOISE_ALONE:
         # Heavy clipping leads to several minima.
-        first = [fit_model(model, edges, signals, None, _ROUGHLY, _TRIES) for model in models]
+        first = [
+            fit_model(model, edges, signals, None, _COARSE_TOLERANCE, _STARTS) for model in models
+        ]
     found = min(first, key=lambda fit: fit.bic)
     edges = [with_noise(edge, found.predicted(k, edge)) for k, edge in enumerate(edges)]
     fits = sorted(
@@ -319,10 +344,10 @@ def _edge_warnings(best: ModelFit, k: int, result: EdgeResult) -> Iterator[str]:
             f"{0.5 / gap / 1e3:.3g} /mm the MTF is aliased; tilt the edge by 2 deg to 10 deg."
         )
     short = min(-float(distance.min()), float(distance.max()))
-    if short < _PLATEAU * result.line_fwhm:
+    if short < _PLATEAU_WIDTHS * result.line_fwhm:
         yield (
             f"{name}: Only {short * 1e6:.3g} um of one side of the edge are seen, under "
-            f"{_PLATEAU:g} widths: tails and brightness of the side cannot be distinguished."
+            f"{_PLATEAU_WIDTHS:g} widths: tails and brightness of the side cannot be distinguished."
         )
     yield from _not_linear(best, k, result)
 
@@ -362,7 +387,7 @@ def _fit_warnings(best: ModelFit, edges: Sequence[EdgeResult]) -> Iterator[str]:
             f"{footprint * 1e6:.3g} um: take it for an upper limit."
         )
     left = max(_left(edge) for edge in edges)
-    if best.reduced_chi_squared > _NOISE_ALONE and left > _NOTHING:
+    if best.reduced_chi_squared > _NOISE_ALONE and left > _NEGLIGIBLE:
         yield (
             f"No model fits: the best, {best.model.name}, leaves "
             f"{sqrt(best.reduced_chi_squared):.2g} times the noise in the means at a distance, "
@@ -377,7 +402,7 @@ def _aperture_warnings(best: ModelFit, signals: ApertureSignals) -> Iterator[str
     left = (signals.radiance - best.aperture_background) / best.source - fractions
     square = float(np.sum((left * best.source / signals.sigma) ** 2))
     largest = int(np.argmax(np.abs(left)))
-    if square >= _APERTURES_APART * left.size and abs(left[largest]) >= _NOTHING:
+    if square >= _APERTURES_APART * left.size and abs(left[largest]) >= _NEGLIGIBLE:
         yield (
             f"The apertures and the edges contradict each other: the signal of "
             f"{signals.diameters[largest] * 1e6:.4g} um is {100 * abs(left[largest]):.2g} % of the "
@@ -406,7 +431,7 @@ def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
     by_model = [
         np.sqrt(weight) * (kernel(other.psf()) - middle)
         for other, weight in zip(knife.fits, knife.weights, strict=True)
-        if other is not fit and weight > _NO_WEIGHT
+        if other is not fit and weight > _LEAST_WEIGHT
     ]
     parts = {FIT: _of_the_fit(knife, fit, kernel), MODEL: by_model}
     if knife.oval:

@@ -26,10 +26,17 @@ from chipglow.laboratory.psf.psf_models import (
 )
 from chipglow.quantities import Array, Brief
 
-_APART: Final = pi / 18
+_LEAST_TURN: Final = pi / 18
+"""Smallest angle in rad between edges that count as of different orientation."""
+
 _START_WIDTHS: Final = (0.5, 1.0, 1.7, 3.0, 5.0, 9.0)
-_DIFFERENCE: Final = 1e-5
+"""Widths from which the fits start, in pixel pitches."""
+
+_SLOPE_STEP: Final = 1e-5
+"""Step of a shape parameter for its slope, in its scale."""
+
 _EDGE_PARAMETERS: Final = 4
+"""Parameters of an edge: two brightnesses, its place and its turn."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -254,7 +261,7 @@ class _Problem:
             result[rows, next(columns)] = -1 / self.apertures.sigma
             result[rows, next(columns)] = -self._fractions(values) / self.apertures.sigma
         for k in range(self.shapes):
-            shift = _DIFFERENCE * self.scales[k] * (1 if vector[k] < self.high[k] / 2 else -1)
+            shift = _SLOPE_STEP * self.scales[k] * (1 if vector[k] < self.high[k] / 2 else -1)
             moved = vector.copy()
             moved[k] += shift
             result[:, k] = (self.residual(moved) - here) / shift
@@ -375,6 +382,6 @@ def orientations(edges: Sequence[EdgePixels]) -> list[float]:
     for edge in edges:
         direction = edge.line.normal % pi
         apart = [abs((direction - other + pi / 2) % pi - pi / 2) for other in found]
-        if min(apart, default=pi) >= _APART:
+        if min(apart, default=pi) >= _LEAST_TURN:
             found.append(direction)
     return found

@@ -19,18 +19,32 @@ from chipglow.camera.optics.pupil import annular_transfer
 from chipglow.quantities import Array
 
 _SAMPLES_PER_FOOTPRINT: Final = 8
+"""Samples along a pixel of the edge-spread function."""
+
 _PERIODS: Final = 64
 """Length of the table of an edge, in its largest distance: diffraction wraps around by 3e-6."""
+
 _TAIL_ENERGY: Final = 0.9999
+"""Fraction of the light within the reach of a tail."""
+
 _KERNEL_NODES: Final = 3
+"""Gauss nodes along a sample, over which a density is integrated."""
+
 _MOST_SIDE: Final = 1025
+"""Largest side of a kernel in samples: 8 MB."""
+
 _LARGEST_WIDTH: Final = 1e-3
+"""Largest width in m that is fitted."""
+
 _LENGTHS: Final = ("fwhm", "diameter")
 _EVEN_DISC: Final = 30.0
 """A disc of this many deviations of its blur is half as bright at its rim, within its 2000th."""
 _MOFFAT_NODES: Final = np.geomspace(1e-7, 60.0, 1000)
 """Arguments of the transfer function: it is 1 under and 0 over them."""
+
 _MOST_WIDTHS: Final = 60.0
+"""Largest reach of a Moffat function in its widths."""
+
 _RADII: Final = 201
 """Radii among which the largest density is looked for."""
 

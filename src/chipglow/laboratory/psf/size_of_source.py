@@ -10,9 +10,13 @@ from numpy.typing import NDArray
 from chipglow.camera import UNUSABLE, Flag, Measurement
 from chipglow.laboratory.psf.psf_fit import ApertureSignals
 from chipglow.quantities import Array, Brief
+from chipglow.uncertainty.component import MAD_FACTOR
 
 _LEAST_APERTURES: Final = 3
+"""Fewest diameters of apertures."""
+
 _FEWEST_OUTSIDE: Final = 20
+"""Fewest pairs of pixels beyond an aperture that show the noise."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,4 +97,4 @@ def _noise(radiance: Array, outside: NDArray[np.bool_]) -> float:
     if pairs.sum() < _FEWEST_OUTSIDE:
         pairs = np.isfinite(radiance[:, 1:]) & np.isfinite(radiance[:, :-1])
     difference = np.diff(radiance, axis=1)[pairs]
-    return float(1.4826 * np.median(np.abs(difference - np.median(difference))) / 2**0.5)
+    return float(MAD_FACTOR * np.median(np.abs(difference - np.median(difference))) / 2**0.5)

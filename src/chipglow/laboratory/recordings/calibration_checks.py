@@ -6,14 +6,26 @@ from typing import Final
 import numpy as np
 from scipy.special import chdtrc, chdtri, stdtr, stdtrit
 
-from chipglow.quantities import Array
+from chipglow.quantities import ZERO_CELSIUS, Array
 
-_UNLIKELY: Final = 0.01
-_ALIKE: Final = 0.05
+_OUTLIER_LEVEL: Final = 0.01
+"""Significance level of a total misfit and of an outlier."""
+
+_CORRELATION_LEVEL: Final = 0.05
+"""Significance level of residuals that are not independent."""
+
 _FAR_WITHIN: Final = 0.1
+"""Mean squared residual, in the uncertainties, below which correlated residuals do no harm."""
+
 _DRAWS: Final = 4000
+"""Draws of independent residuals from which the significance follows."""
+
 _SEED: Final = 1950
+"""Seed of the draws, so that the same files give the same numbers."""
+
 _LEAST_FREEDOM: Final = 3
+"""Fewest degrees of freedom for a test whose scatter comes from the residuals."""
+
 _LEAST_FALL: Final = 0.5
 """Portion of chi-squared that a point must take with it to be called an outlier."""
 
@@ -28,7 +40,7 @@ def residual_warnings(
     """
     free = residuals.size - design.shape[1]
     total = float(residuals @ residuals)
-    if stated and free > 0 and chdtrc(free, total) < _UNLIKELY:
+    if stated and free > 0 and chdtrc(free, total) < _OUTLIER_LEVEL:
         yield (
             f"The residuals are {np.sqrt(total / free):.3g} times as large as the stated "
             f"uncertainties explain (chi-squared {total:.4g} with {free} degrees of freedom): the "
@@ -37,7 +49,7 @@ def residual_warnings(
         )
     if free >= 2 and (point := _outlier(residuals, design, stated)) is not None:
         yield (
-            f"The point at {kelvins[point] - 273.15:.5g} °C lies "
+            f"The point at {kelvins[point] - ZERO_CELSIUS:.5g} °C lies "
             f"{abs(residuals[point]):.3g} standard uncertainties from the others' curve; without "
             "it they agree far better. Check it."
         )
@@ -58,7 +70,7 @@ def alike(residuals: Array, design: Array) -> bool:
         return False
     tests = (_serial_probability, _drift_probability)
     # Two tests, each at half of the level.
-    return min(test(residuals, design) for test in tests) < _ALIKE / len(tests)
+    return min(test(residuals, design) for test in tests) < _CORRELATION_LEVEL / len(tests)
 
 
 def drift_shift(residuals: Array, design: Array) -> Array:
@@ -82,8 +94,8 @@ def _outlier(residuals: Array, design: Array, stated: bool) -> int | None:
     free = residuals.size - design.shape[1] - 1
     rest = max(total - float(fall[point]), 1e-300)
     scatter = max(rest / free, 1.0) if stated else rest / free
-    student = float(stdtrit(free, _UNLIKELY / (2 * (free + 2)))) ** 2
-    limit = float(chdtri(1, _UNLIKELY / residuals.size)) if stated else student
+    student = float(stdtrit(free, _OUTLIER_LEVEL / (2 * (free + 2)))) ** 2
+    limit = float(chdtri(1, _OUTLIER_LEVEL / residuals.size)) if stated else student
     far = fall[point] > limit * scatter and fall[point] > _LEAST_FALL * total
     return point if far and (stated or free >= _LEAST_FREEDOM) else None
 

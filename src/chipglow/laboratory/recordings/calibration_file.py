@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal
 import numpy as np
 
 from chipglow.camera import MODELS, FittedCalibration
-from chipglow.camera.recording import MeasuringRange
+from chipglow.camera.calibration import CalibrationSettings
 from chipglow.io import atomic_path
 from chipglow.laboratory.recordings.calibration_fit import CalibrationFit
 from chipglow.quantities import ZERO_CELSIUS, Parameter
@@ -21,7 +21,7 @@ PointRow = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class CalibrationDescription(MeasuringRange):
+class CalibrationDescription(CalibrationSettings):
     """A calibration of a camera's counts by blackbodies."""
 
     model: Annotated[
@@ -53,10 +53,6 @@ class CalibrationDescription(MeasuringRange):
             "common error of the blackbody temperatures."
         ),
     ]
-    warnings: Annotated[
-        tuple[str, ...],
-        Parameter("Warnings, as sentences; every measurement with this calibration repeats them."),
-    ] = ()
     points: Annotated[
         tuple[PointRow, ...],
         Parameter(

@@ -11,16 +11,23 @@ from scipy.special import chdtrc, ndtri, stdtrit
 
 from chipglow.camera.calibration import FittedCalibration
 from chipglow.laboratory.recordings.calibration_checks import alike, drift_shift, residual_warnings
-from chipglow.quantities import Array, Brief, Parameter, Part
+from chipglow.quantities import ZERO_CELSIUS, Array, Brief, Parameter, Part
 from chipglow.quantities.units import COLDEST, HOTTEST, TEMPERATURE
 from chipglow.radiometry import Band
 
 Kind = TypeVar("Kind", bound=FittedCalibration)
 
 _QUANTILE: Final = 0.975
-_MOST_ROUNDS: Final = 50
-_SETTLED: Final = 1e-9
-_EXACT: Final = 1e-12
+"""Probability at which Student's factor replaces the normal one: both ends of 95 %."""
+
+_MOST_ITERATIONS: Final = 50
+"""Most iterations of a fit and its weights."""
+
+_SETTLED_CHANGE: Final = 1e-9
+"""Relative change of the weights at which the iterations end."""
+
+_ROUNDING: Final = 1e-12
+"""Part of the largest count below which residuals are rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -183,7 +190,7 @@ def fit_calibration(
     calibration = _settled(calibration, kelvins, signal, deviations)
     residuals, spread = signal - calibration.counts(kelvins), deviations(calibration)
     if not stated:
-        rounding = _EXACT * np.abs(signal).max()
+        rounding = _ROUNDING * np.abs(signal).max()
         scatter = np.sqrt(np.sum(residuals**2) / (signal.size - start.size))
         spread = np.full_like(signal, max(scatter, rounding))
     fit = CalibrationFit(calibration, kelvins, signal, residuals, spread, stated)
@@ -218,11 +225,11 @@ def _check_points(kelvins: Array, counts: Array, parameters: int, stated: bool) 
     if impossible.size:
         raise ValueError(
             f"calibration: a blackbody is at {impossible[0]:g} K "
-            f"({impossible[0] - 273.15:g} °C), expected {COLDEST:g} to {HOTTEST:g} K"
+            f"({impossible[0] - ZERO_CELSIUS:g} °C), expected {COLDEST:g} to {HOTTEST:g} K"
         )
     largest = np.unique(kelvins[counts == counts.max(initial=-np.inf)])
     if largest.size > 1 and np.unique(counts).size > 1:
-        places = ", ".join(f"{kelvin - 273.15:.5g}" for kelvin in largest)
+        places = ", ".join(f"{kelvin - ZERO_CELSIUS:.5g}" for kelvin in largest)
         raise ValueError(
             f"calibration: the counts are {counts.max():.7g} at each of {places} °C and nowhere "
             "greater: the camera is saturated there, expected points without saturation"
@@ -251,10 +258,10 @@ def _settled(
         raise ValueError(
             "calibration: both uncertainties of a point are 0; give a positive one, or none"
         )
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MOST_ITERATIONS):
         calibration = _least_squares(calibration, kelvins, counts, weights)
         before, weights = weights, deviations(calibration)
-        if np.allclose(weights, before, rtol=_SETTLED, atol=0.0):
+        if np.allclose(weights, before, rtol=_SETTLED_CHANGE, atol=0.0):
             _expect_rising(calibration.rises)
             return calibration
     raise ValueError("calibration: the reweighted fit did not converge; check for outliers")

@@ -29,12 +29,17 @@ from chipglow.laboratory.recordings.description import MeasurementDescription, l
 from chipglow.laboratory.recordings.radiometric_calibration import calibrate_recording
 from chipglow.quantities import Array
 from chipglow.text import DescriptionError
+from chipglow.uncertainty.component import MAD_FACTOR
 
 WHOLE: Final = np.s_[:, :]
 """All rows and columns of an image."""
 
 _BLOCKS: Final = 4
-_CLEARLY: Final = 4.0
+"""Blocks along each side of an image whose medians are compared."""
+
+_DEVIATION_LIMIT: Final = 4.0
+"""Standard errors beyond which a block's median differs from the typical one."""
+
 _MOST_OUTSIDE: Final = 0.05
 """Fraction of a flat-field source's frames that may be outside the range, as bad pixels are."""
 
@@ -139,11 +144,11 @@ def _unevenness(image: Array) -> float:
     blocks = [part for one in strips for part in np.array_split(one, _BLOCKS, axis=1)]
     values = [block[np.isfinite(block)] for block in blocks if np.isfinite(block).any()]
     medians = np.array([np.median(one) for one in values])
-    spreads = [1.4826 * np.median(np.abs(one - np.median(one))) for one in values]
+    spreads = [MAD_FACTOR * np.median(np.abs(one - np.median(one))) for one in values]
     # The standard error of a median is 1.25 times that of the mean.
     errors = 1.25 * np.median(spreads) / np.sqrt([one.size for one in values])
     away = np.abs(medians - np.median(medians))
-    return float(np.max(away, where=away > _CLEARLY * errors, initial=0.0))
+    return float(np.max(away, where=away > _DEVIATION_LIMIT * errors, initial=0.0))
 
 
 def pixel_correction(

@@ -22,12 +22,20 @@ _FLAGS: Final = {
     Flag.DEAD: ("dead", "black"),
     Flag.REPLACED: ("replaced", GREEN),
 }
+
 _IMAGE_HEIGHTS: Final = (2.0, 6.0)
-_HISTOGRAM: Final = 2.2
+"""Smallest and largest height of an image in inches."""
+
+_HISTOGRAM_HEIGHT: Final = 2.2
+"""Height of the histogram in inches."""
+
 _BINS: Final = 80
+"""Bins of the histogram."""
 
 _MARKS: Final = ("o", "s", "^")
-_SAMPLES: Final = 300
+
+_CURVE_POINTS: Final = 300
+"""Temperatures of a calibration's curve."""
 
 
 def draw_measurement(measurement: Measurement, time: float | None = None) -> Figure:
@@ -37,8 +45,8 @@ def draw_measurement(measurement: Measurement, time: float | None = None) -> Fig
     flags, raster = measurement.flags[index], measurement.raster
     height = float(np.clip(5.6 * raster.rows / raster.columns, *_IMAGE_HEIGHTS))
     with drawing.style():
-        figure = drawing.new_figure(height + _HISTOGRAM + 0.9)
-        upper, lower = figure.subplots(2, 1, height_ratios=(height, _HISTOGRAM))
+        figure = drawing.new_figure(height + _HISTOGRAM_HEIGHT + 0.9)
+        upper, lower = figure.subplots(2, 1, height_ratios=(height, _HISTOGRAM_HEIGHT))
         title, limits = f"{measurement.times[index] * 1e6:.6g} µs", scales.ends(celsius)
         panel = ImagePanel(title, "radiance temperature / °C", celsius, limits, scales.HEAT)
         panel.draw(figure, upper, raster, measurement.tool)
@@ -97,7 +105,7 @@ def _draw_fit(
     mark: str,
 ) -> None:
     calibration = fit.calibration
-    kelvins = np.linspace(calibration.lowest, calibration.highest, _SAMPLES)
+    kelvins = np.linspace(calibration.lowest, calibration.highest, _CURVE_POINTS)
     counts = calibration.counts(kelvins)
     upper.plot(kelvins - ZERO_CELSIUS, counts, color=colour, linewidth=1.0, label=name)
     uncertainty = calibration.uncertainty(counts) / calibration.band.slope(kelvins)

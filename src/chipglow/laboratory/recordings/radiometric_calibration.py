@@ -27,8 +27,12 @@ Mirror: TypeAlias = Literal["none", "horizontal", "vertical"]
 
 _SAME: Final = 0.01
 """Relative difference up to which two integration times or limits of bands are the same."""
+
 _PIXELS_AT_ONCE: Final = 1 << 22
+"""Pixels that are converted together: 32 MB for each array in between."""
+
 _FULL_SCALES: Final = tuple(2**bits - 1 for bits in (8, 10, 12, 13, 14, 16))
+"""Largest counts of the usual converters, by their bits."""
 
 
 def _two_numbers(value: object) -> object:

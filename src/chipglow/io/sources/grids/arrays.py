@@ -31,6 +31,8 @@ from chipglow.io.sources.source import (
 from chipglow.text import Notes, read_matrix
 
 _MOST_NOTES: Final = 10
+"""Most notes on the files of a series."""
+
 _MORE_NOTES: Final = "There are more notes on further files."
 _KINDS: Final = "fiub"
 _ATTRIBUTES: Final = (

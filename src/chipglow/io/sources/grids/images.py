@@ -36,6 +36,7 @@ TURNS: Final[Mapping[int, Turn]] = {
 """From stored to upright images by the value of `ORIENTATION`."""
 
 _TRANSPOSED: Final = (5, 6, 7, 8)
+"""TIFF orientations with exchanged rows and columns."""
 
 
 def _turn(orientation: object, notes: Notes) -> int:

@@ -22,7 +22,10 @@ A field with second derivative f'' along an edge of length h is then off by up t
 """
 
 _LINES_AND_POINTS: Final = (0, 1, 2, 3, 4, 21, 36, 60, 61, 68, 75)
+
 _NUDGE: Final = 1e-7
+"""Part of the mesh by which a cut in its outermost face is moved inwards."""
+
 _FLAT: Final = 1e-3  # depth of a mesh by its longest side, up to which it is flat
 _TOOL: Final = "chipglow: tool"
 _HIDDEN_GHOST: Final = 32

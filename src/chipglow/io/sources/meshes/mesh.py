@@ -53,7 +53,9 @@ _VECTOR: Final = "velocity"
 _COMPONENTS: Final = ("velocity_x", "velocity_y")
 _VECTOR_SIZES: Final = (2, 3)
 _COMPOUND_SIZES: Final = (*_VECTOR_SIZES, 6, 9)
+
 _MOST_PARTS: Final = 1000
+"""Most parts of a mesh."""
 
 
 @dataclass(frozen=True)

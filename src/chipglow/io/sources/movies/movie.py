@@ -59,6 +59,8 @@ Pixel = tuple[float, float]
 """Place in a picture: pixels right and down from its upper left corner."""
 
 _LEGEND_MARGIN: Final = 3
+"""Pixels around a legend that are left out with it."""
+
 _NOISE_OF_YUV: Final = 1.0
 """Least noise in CIE L*a*b* of colours that are stored as 8 bits of luminance and chrominance.
 

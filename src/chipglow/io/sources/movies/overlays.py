@@ -37,7 +37,10 @@ MARK_TOLERANCE: Final = 10.0
 _GREY: Final = 10.0
 _FEWEST_FILLED: Final = 0.01
 _SHIFTS: Final = ((2, 3), (5, -4), (-3, 6))
+
 _LUMA: Final = np.array([0.299, 0.587, 0.114])
+"""Weights of red, green and blue in the brightness (ITU-R BT.601)."""
+
 _VALLEY: Final = 0.2
 _NOISE: Final = 8.0
 _ONE_COLOUR: Final = 3.0

@@ -16,6 +16,8 @@ from chipglow.io.sources.movies.colour_scale import Picture
 from chipglow.io.sources.source import SourceError, required
 
 _MOST_PIXELS: Final = 1 << 26
+"""Most pixels of a picture: 64 Mi."""
+
 # No playlists, scripts or numbered files: a movie may not lead to other files or to the network.
 _FORMATS: Final = (
     "avi,mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,gif,apng,mpeg,mpegvideo,mpegts,asf,flv,ogg,nut,ivf,"

@@ -21,7 +21,9 @@ from chipglow.text import NamedTable, Notes, read_named_table
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")
 TEXT_SUFFIXES: Final = (".csv", ".txt", ".dat", ".tsv")
+
 MOST_POINTS: Final = 10_000_000
+"""Most points of a file; limits memory."""
 
 _PLACES: Final = ("points", "positions", "position", "coordinates", "coords", "pos", "location")
 _PERHAPS_TIME: Final = "t"

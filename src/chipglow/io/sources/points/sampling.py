@@ -20,11 +20,19 @@ from chipglow.scene.frame import Material
 from chipglow.scene.raster import Raster
 
 _SMOOTHING: Final = 1.4
+"""Width of the smooth kernel in spacings of the points."""
+
 _SHARPNESS: Final = 0.75
 _REACH: Final = 2.0
+
 _NEIGHBOURS: Final = 12
+"""Neighbours of a point that are searched, for each layer of points."""
+
 _MOST_NEIGHBOURS: Final = 48
-_BLOCK: Final = 100_000
+
+_BLOCK_POINTS: Final = 100_000
+"""Points that are searched at once."""
+
 _FLAT: Final = 0.02
 _FAINT: Final = 1e-9
 _FILLED: Final = 0.5
@@ -146,8 +154,8 @@ def _neighbours(
     if count < 1:
         return neighbours, nearest
     tree = scipy.spatial.KDTree(places)
-    for first in range(0, len(places), _BLOCK):
-        part = slice(first, first + _BLOCK)
+    for first in range(0, len(places), _BLOCK_POINTS):
+        part = slice(first, first + _BLOCK_POINTS)
         distances, found = tree.query(places[part], count + 1)
         neighbours[part], nearest[part] = found[:, 1:], distances[:, 1]
     return neighbours, nearest
