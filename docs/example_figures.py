@@ -11,7 +11,7 @@ ORDER: Final = (
     *("radiance", "texture", "oxide_direction", "reflections", "steps", "psf", "optics"),
     *("detector", "shutter", "error", "tool_edges"),
     *("camera_files", "calibration", "emissivity", "temperature", "knife_edge", "registration"),
-    *("rake_face", "shear_band", "compare"),
+    *("rake_face", "shear_band", "correction", "compare"),
     *("programs", "meshes", "grids", "points", "movies", "any_scene"),
 )
 

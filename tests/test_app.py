@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from tolerances import DOUBLE
 
 import chipglow
 from chipglow.analysis import LinePlace, attribute, error_images, error_parts
@@ -325,7 +326,7 @@ def test_draws_are_those_of_other_pixels_and_textures(model):
     assert drawn.error.values[1, 1] == pytest.approx(at_cursor, abs=1e-9)
     points = state.line("band_line").line(pixels.spacing).points
     measured = sample(errors["measured"].values, pixels, points) - ZERO_CELSIUS
-    np.testing.assert_allclose(drawn.lines["band_line"][5], measured, rtol=1e-12)
+    np.testing.assert_allclose(drawn.lines["band_line"][5], measured, rtol=DOUBLE)
 
 
 def test_a_quick_look_is_the_same_scene_on_fewer_samples_and_no_finer_pixels(model):

@@ -10,8 +10,9 @@ from chipglow.app.controls import CORRECTION_IMAGES
 from chipglow.app.files import study_file
 from chipglow.app.opening import open_any
 from chipglow.app.session import Session, SupersededError
+from chipglow.app.view import View
 from chipglow.camera import Measurement
-from chipglow.correction import correct, observed_scene, surroundings_of
+from chipglow.correction import correct, observed_scene, surroundings_of, write_correction
 from chipglow.io import example_scene
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.study import fit
@@ -151,6 +152,29 @@ def test_a_session_says_that_it_corrects_and_sends_the_picture_again(model, pict
     assert kinds[-3:] == ["correcting", "picture", "numbers"]
     *_, before, after = (content[1] for kind, content in told if kind == "picture")
     assert before.corrected is None and after.corrected is not None
+
+
+def test_a_corrected_file_opens_with_its_images_and_bars(picture, tmp_path):
+    correction = picture.corrected.correction
+    write_correction(correction, tmp_path / "corrected.nc")
+    view, sent = View(open_any(tmp_path / "corrected.nc")), []
+    view.page._send_msg = sent.append
+    session = view.session
+    session._painted.set()
+    session._picture(session.state)
+    shown = session.model.picture(session.state).panels
+    data = correction.data.isel(time=0)
+    assert list(shown) == ["measured", "corrected", "half_width"]
+    np.testing.assert_array_equal(
+        shown["corrected"].values, data["temperature"].values - ZERO_CELSIUS
+    )
+    half = (data["upper"].values - data["lower"].values) / 2
+    np.testing.assert_array_equal(shown["half_width"].values, half)
+    statuses = [one["content"] for one in sent if one["kind"] == "status"]
+    assert statuses[-1]["text"].startswith("Corrected: ")
+    html = next(one["content"] for one in sent if one["kind"] == "numbers")
+    assert "Contributions to its standard uncertainty" in html
+    assert "error of the correction" not in html  # no truth, no error
 
 
 def test_without_a_blur_the_page_says_why_there_is_no_correction(model, state):

@@ -662,6 +662,9 @@ def test_a_budget_is_drawn_as_a_figure_and_shown_by_its_summary(plate):
     widths = [bar.get_width() for bar in axes.patches]
     assert widths[-1] == found.budget.estimate.standard_uncertainty[0]  # all together
     assert widths[0] == found.to_frame().contribution_K.max()
+    indices = found.indices()
+    assert list(indices.reading.values) == ["middle, pixel"]
+    np.testing.assert_array_equal(indices.total_order, found.budget.indices.total_order)
     columns, rows, sentences = in_a_notebook(found)
     assert columns == list(found.summary().columns)
     assert rows[0][:2] == ["middle, pixel", f"{found.budget.estimate.values[0]:.6g}"]

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from calibrate_cutting import Fit, Observation
 from experiments import read_experiments
+from tolerances import DOUBLE
 
 NUMBERS = len(calibrate.RANGES)
 SLOPES = 0.1 * np.random.default_rng(1).normal(size=(3, NUMBERS))
@@ -57,9 +58,9 @@ def test_the_paper_has_its_own_edge_and_the_others_the_fitted_one():
     papers = calibrate.simulation(experiments["paper"], place)
     other = calibrate.simulation(experiments["amm-200-0.15-neg7"], place)
     assert papers.tool.edge_radius == 20e-6
-    assert other.tool.edge_radius == pytest.approx((70e-6 * 122e-6) ** 0.5, rel=1e-12)
-    assert papers.workpiece.flow_stress.thermal_stress == pytest.approx(1.25 * 1533.7e6, rel=1e-12)
-    assert papers.workpiece.damage.loss == pytest.approx((0.6 * 0.92) ** 0.5, rel=1e-12)
+    assert other.tool.edge_radius == pytest.approx((70e-6 * 122e-6) ** 0.5, rel=DOUBLE)
+    assert papers.workpiece.flow_stress.thermal_stress == pytest.approx(1.25 * 1533.7e6, rel=DOUBLE)
+    assert papers.workpiece.damage.loss == pytest.approx((0.6 * 0.92) ** 0.5, rel=DOUBLE)
 
 
 def test_four_cuts_are_measured_and_their_forces_compared():

@@ -10,6 +10,7 @@ import pytest
 from figure6 import figure_6
 from hypothesis import given, strategies as st
 from scipy.special import erf
+from tolerances import DOUBLE
 
 from chipglow.camera import (
     AnnularAperturePSF,
@@ -156,11 +157,11 @@ def test_true_temperatures_are_those_of_the_material_while_it_is_there():
     exposure = Camera(integration_time=3 * STEP).expose(scene, BLACK, 0.5 * STEP)
     there = material[exposed] == 1
     fraction = (weights * there).sum(axis=0)
-    np.testing.assert_allclose(exposure.material_fraction, fraction, rtol=1e-12)
+    np.testing.assert_allclose(exposure.material_fraction, fraction, rtol=DOUBLE)
     known = np.where(there, kelvins[exposed], 0.0)
     with np.errstate(invalid="ignore"):
         mean = (weights * known).sum(axis=0) / fraction
-    np.testing.assert_allclose(exposure.mean_temperature, mean, rtol=1e-12)
+    np.testing.assert_allclose(exposure.mean_temperature, mean, rtol=DOUBLE)
     np.testing.assert_array_equal(
         exposure.centre_temperature, np.where(there[2], kelvins[2], np.nan)
     )
@@ -233,7 +234,7 @@ def test_sampling_conserves_energy(pitch, offset, fill):
     sensors = sensor_raster(scene, pitch, (offset, offset), None)
     radiance = np.random.default_rng(5).uniform(1, 2, scene.shape)
     np.testing.assert_allclose(
-        integrate(np.ones(scene.shape), scene, sensors, fill), 1.0, rtol=1e-12
+        integrate(np.ones(scene.shape), scene, sensors, fill), 1.0, rtol=DOUBLE
     )
     whole = integrate(radiance, scene, sensors, 1.0).sum() * pitch**2
     reach = [

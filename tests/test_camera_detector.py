@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
+from tolerances import DOUBLE
 
 from chipglow import camera as cam
 from chipglow.analysis import error_images, headline
@@ -200,7 +201,7 @@ def test_a_microbolometer_lags_by_its_time_constant():
     radiance = np.broadcast_to(np.array([1.0, 3.0, 3.0, 3.0])[:, None, None], (4, 2, 3))
     left = np.exp(-np.arange(4) / 60.0 / 10e-3)
     read, _ = read_radiance(made, radiance, starts)
-    np.testing.assert_allclose(read[:, 0, 0], 3.0 - 2.0 * left, rtol=1e-12)
+    np.testing.assert_allclose(read[:, 0, 0], 3.0 - 2.0 * left, rtol=DOUBLE)
     np.testing.assert_array_equal(read_radiance(made, radiance, 7.0 * starts)[0], radiance)
     (warning,) = made.form_measurement(exposure()).notes.warnings
     assert "thermal time constant is 10 ms" in warning
@@ -221,7 +222,7 @@ def test_error_images_have_the_noise_in_both_cases_and_the_psf_does_not():
     assert apart < 0.2 * spread
     measured = noisy.form_measurement(exposure())
     np.testing.assert_allclose(
-        seen.measured, measured.radiance_temperature(flagged=True)[0], rtol=1e-12
+        seen.measured, measured.radiance_temperature(flagged=True)[0], rtol=DOUBLE
     )
 
 
@@ -312,7 +313,7 @@ def test_the_errors_of_a_scene_have_the_noise_of_each_draw(undrawn, tmp_path):
     (measurement,) = noisy.measurements.values()
     assert "detector_response" in measurement.data.attrs
     image = noisy.data.image_measured.sel(effects="all").values[0]
-    np.testing.assert_allclose(image, measurement.radiance_temperature()[0], rtol=1e-12)
+    np.testing.assert_allclose(image, measurement.radiance_temperature()[0], rtol=DOUBLE)
     rows = {row.key: row.here for row in all_rows(Facts(noisy))["camera"]}
     assert rows["netd_half_K"] == calibration.half_netd
     assert all_rows(Facts(quiet))["camera"] == []

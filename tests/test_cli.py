@@ -36,7 +36,7 @@ ROOT = Path(__file__).parents[1]
 RASTER = AnalyticChip().raster
 STUDY = f"""
 title: A chip in closed form
-cutting: {dumps({"field_of_view": AnalyticChip().field_of_view})}
+cutting: {dumps({"field_of_view": AnalyticChip().field_of_view, "numerics": {"cell": "25 um"}})}
 analysis: {{exposures: 3, phases: 3, psf_widths: [8 um, 12 um]}}
 """
 
@@ -124,7 +124,7 @@ def test_run_writes_a_report_and_prints_the_comparison(finished):
     assert "results/report.html" in result.output
     headings = ("quantity", "the paper", "this study", "single frame (95 %)", "differs")
     assert all(text in result.output for text in (*headings, "−42", "90"))
-    assert "Warning: The edge radius, 20 um, is 1 cell, expected 5 or more" in result.stderr
+    assert "Warning: The edge radius, 20 um, is 0.8 cells, expected 1 or more" in result.stderr
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     last = result.stdout.splitlines()[-1]
     year, version = citation["date-released"].year, citation["version"]
@@ -251,9 +251,9 @@ def test_cut_writes_the_scene_and_keeps_it_in_the_cache(folder, runs, tmp_path):
         "Scaled mass after the build-up: kinetic energy at most 0.00% of the work" in result.stderr
     )
     assert "momentum flux 0.83% of the mean cutting force" in result.stderr
-    # The paper's edge of 20 um is known, and too small for the default cell.
-    assert result.stderr.count("Warning") == 1
-    assert "Warning: The edge radius, 20 um, is 1 cell, expected 5 or more" in result.stderr
+    # The paper's edge and the length of the viscosity, 20 um, are smaller than the cell.
+    assert result.stderr.count("Warning") == 2
+    assert "Warning: The edge radius, 20 um, is 0.8 cells, expected 1 or more" in result.stderr
     listed = chipglow("cache", "list").output
     assert re.search(r"\d MB  scene-[0-9a-f]{32}\.nc", listed)
     assert re.search(r"1 scene, \d+\.\d MB in ", listed)

@@ -185,6 +185,7 @@ def test_what_the_report_says_and_draws(analysis):
     assert len(said) == 4  # two places, two surfaces
     assert f"is {rake.estimate.values - 273.15:.0f} ± " in said[0]
     assert f"the true temperature is {rake.true - 273.15:.0f} °C" in said[0]
+    assert "uncertainty of the mean emissivity is 0.020." in said[2]
     images, curves = corrected.images(facts), corrected.curves(facts)
     assert [axes.get_title() for axes in images.axes][:3] == [
         "measured, chip 2", "corrected, chip 2", "true, chip 2",

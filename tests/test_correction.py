@@ -329,6 +329,33 @@ def test_places_of_a_result(chip_and_tool, tmp_path):
     assert "Correction" in repr(result)
 
 
+def test_a_notebook_shows_each_frame_of_a_result(chip_and_tool):
+    result, _, _ = chip_and_tool
+    html = result._repr_html_()
+    hottest = float(np.nanmax(result.data["temperature"])) - 273.15
+    assert "Correction: 1 frames of 24 x 24 pixels" in html
+    assert f"<td>{hottest:.6g}</td>" in html and "<td>576</td>" in html
+    assert "Noise" not in html  # which was stated
+    frame = result.to_frame()
+    assert (frame.measured.values == result.data["measured"][0].values.ravel()).all()
+    assert result.flags.shape == (1, 24, 24)
+
+
+@pytest.mark.parametrize(
+    "read",
+    [
+        lambda result: result.at((1e-5, 1e-5), 1),
+        lambda result: result.budget((1e-5, 1e-5), 1),
+        lambda result: result.contribution("noise", 1),
+        lambda result: result.to_frame(1),
+        lambda result: result.plot(1),
+    ],
+)
+def test_a_frame_that_does_not_exist_is_refused(chip_and_tool, read):
+    with pytest.raises(ValueError, match="frame: is 1, expected 0 to 0"):
+        read(chip_and_tool[0])
+
+
 def test_the_same_seed_gives_the_same_result(chip_and_tool):
     result, _, image = chip_and_tool
     again = correct(image, CAMERA, zones(image.raster), surroundings=DARK, noise=0.5)

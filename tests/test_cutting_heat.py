@@ -8,6 +8,7 @@ from cases.heat import CAPACITY, CONDUCTIVITY, DIFFUSIVITY, constant_properties
 from scipy.constants import Stefan_Boltzmann
 from solver import DENSITY, Block
 from test_cutting_solver import short_cut
+from tolerances import DOUBLE
 
 from chipglow.cutting import CARBIDE, Surroundings
 from chipglow.cutting.heat import (
@@ -123,7 +124,7 @@ def test_conduction_and_evening_out_keep_heat_whatever_the_shape(change, left):
     block = WarmBlock((100e-6, 80e-6)).thinned(1)
     before = block.points["temperature"].copy()
     after = change(block)
-    assert after.sum() == pytest.approx(before.sum(), rel=1e-12)
+    assert after.sum() == pytest.approx(before.sum(), rel=DOUBLE)
     assert after.std() < left * before.std()
 
 

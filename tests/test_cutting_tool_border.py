@@ -5,6 +5,7 @@ from math import ceil, sqrt
 import numpy as np
 import pytest
 from scipy.special import erfc
+from tolerances import DOUBLE
 
 from chipglow.cutting import CARBIDE, CuttingSimulation, Numerics
 from chipglow.cutting.heat import (
@@ -118,7 +119,7 @@ def test_no_heat_is_lost_at_the_border():
     first = HEAT.capacity * tool.grid.cell**2
     before = first * 100.0 * np.maximum(tool.fraction, SMALLEST_FRACTION)[tool.fraction > 0].sum()
     assert tool.temperature.max() < 50.0
-    assert tool.held() == pytest.approx(before, rel=1e-12)
+    assert tool.held() == pytest.approx(before, rel=DOUBLE)
 
 
 def test_the_tool_of_a_cut_goes_on_beyond_the_region():

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
+from tolerances import DOUBLE
 
 from chipglow.analysis import attribute, error_images, error_parts
 from chipglow.camera import (
@@ -128,4 +129,4 @@ def test_the_chain_is_linear_and_has_an_adjoint(scenes):
     radiance = generator.random(scene.raster.shape)
     image = generator.random(CAMERA.pixels(scene.raster).shape)
     forward, back = chain.forward(radiance), chain.adjoint(image)
-    assert np.vdot(forward, image) == pytest.approx(np.vdot(radiance, back), rel=1e-12)
+    assert np.vdot(forward, image) == pytest.approx(np.vdot(radiance, back), rel=DOUBLE)

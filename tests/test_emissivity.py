@@ -13,6 +13,7 @@ from command import typed
 from drawn import in_a_notebook, legend_of, on_given_axes, on_new_axes, points_of
 from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
 from hypothesis import given, settings, strategies as st
+from tolerances import DOUBLE
 
 from chipglow.camera import CalibrationErrors, Camera, Flag
 from chipglow.io import write_measurement
@@ -65,7 +66,7 @@ def test_equation_2_is_undone(emissivity, reference, reflected):
     small = Raster(0.0, 0.0, 6e-6, 2, 2)
     image = measured(np.full((2, 2), emissivity), reference, reflected, raster=small)
     found = em.determine_emissivity([image], em.Heating(reference, reflected))
-    np.testing.assert_allclose(found.emissivity, emissivity, rtol=1e-12)
+    np.testing.assert_allclose(found.emissivity, emissivity, rtol=DOUBLE)
 
 
 @pytest.mark.parametrize(
@@ -114,6 +115,7 @@ def test_the_budget_is_that_of_the_derivatives():
         assert row.estimate.effect(cause) == pytest.approx(effect, rel=1e-3)
     total = np.linalg.norm([row.estimate.effect(cause) for cause in COMMON])
     assert row.estimate.standard_uncertainty == pytest.approx(total, rel=1e-9)
+    # Printed with six decimals.
     assert row.estimate.coverage_factor() == pytest.approx(1.959964, abs=1e-6)
 
 
@@ -241,7 +243,7 @@ def test_flagged_pixels_are_left_out_counted_and_doubted():
     np.testing.assert_array_equal(np.isnan(found.emissivity), out)
     assert (row.used.count, row.used.left_out) == (1150, 50)
     assert row.used.flagged == {Flag.UNDER_RANGE: 0, Flag.SATURATED: 40, Flag.DEAD: 10}
-    assert row.mean == pytest.approx(put_in[~out].mean(), rel=1e-12)
+    assert row.mean == pytest.approx(put_in[~out].mean(), rel=DOUBLE)
     assert row.estimate.warnings == ()
     flags[0, 5, :20] = Flag.SATURATED
     row = of_whole(measured(put_in, frames=3, flags=flags))

@@ -7,6 +7,7 @@ import experiments
 import numpy as np
 import pytest
 from experiments import Experiment, Means, Published
+from tolerances import DOUBLE
 
 from chipglow.cutting import EnergyHistory, ForceHistory
 from chipglow.cutting.recording import ENERGIES
@@ -127,4 +128,4 @@ def test_drift_is_the_change_of_the_mean_from_half_to_half():
     history = ForceHistory(
         time, cutting, np.full(100, 1e5), np.full(100, 4e-4), none, overview=None
     )
-    assert experiments.drift(history) == pytest.approx(0.1, rel=1e-12)
+    assert experiments.drift(history) == pytest.approx(0.1, rel=DOUBLE)

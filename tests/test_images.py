@@ -11,6 +11,7 @@ import pytest
 import scipy.io
 import tifffile
 from PIL import Image, ImageOps, PngImagePlugin
+from tolerances import DOUBLE, SINGLE
 
 from chipglow.io.cameras.formats import find_format, read_here
 from chipglow.io.cameras.stacks import Stated
@@ -42,7 +43,7 @@ def check_import(path, expected):
     rows, columns = expected.shape[-2:]
     frames = source.frames(Raster(0.0, 0.0, 1.0, rows, columns))
     for frame, image in zip(frames, expected, strict=True):
-        np.testing.assert_allclose(frame.fields["temperature"], image, rtol=1e-6)
+        np.testing.assert_allclose(frame.fields["temperature"], image, rtol=SINGLE)
 
 
 def tiff(path, values, **options):
@@ -302,7 +303,7 @@ def test_the_calibration_function_of_imagej_is_applied(tmp_path, function, frame
     expected = sum(c * STACK[:frames].astype(float) ** n for n, c in enumerate(stated.values()))
     recording = read(path, unit=None, interval=None)
     assert recording.quantity == "temperature"
-    np.testing.assert_allclose(recording.signal, expected + 273.15, rtol=1e-12)
+    np.testing.assert_allclose(recording.signal, expected + 273.15, rtol=DOUBLE)
     assert recording.times == pytest.approx(0.02 * np.arange(frames))
     assert "ImageJ's calibration function, -273.15 + 0.01 n" in recording.notes.remarks[0]
     check_import(path, expected + 273.15)
@@ -358,7 +359,7 @@ def test_units_of_imagej(tmp_path, vunit):
     text = "ImageJ=1.53t\n" + "".join(f"{name}={value}\n" for name, value in stated.items())
     tiff(path, IMAGE, description=text.encode("cp1252"), metadata=None)
     recording = read(path, unit=None)
-    np.testing.assert_allclose(recording.signal, [IMAGE * 0.01 + 273.15], rtol=1e-12)
+    np.testing.assert_allclose(recording.signal, [IMAGE * 0.01 + 273.15], rtol=DOUBLE)
 
 
 @pytest.mark.parametrize(

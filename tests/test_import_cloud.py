@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from refusals import refused_on
+from tolerances import SINGLE
 
 from chipglow.io.sources import Placement, SourceError, Units
 from chipglow.io.sources.points.cloud import CloudSource
@@ -114,7 +115,7 @@ def test_tool_and_workpiece_share_the_seam_and_keep_their_values():
     found, kinds = sample_cloud(a_cloud(places, values, material), raster)
     expected = np.broadcast_to(np.where(raster.x < 30e-6, 1, 2), raster.shape)
     np.testing.assert_array_equal(kinds, expected)
-    np.testing.assert_allclose(found[0], np.where(expected == 1, 300.0, 900.0), rtol=1e-6)
+    np.testing.assert_allclose(found[0], np.where(expected == 1, 300.0, 900.0), rtol=SINGLE)
 
 
 @settings(max_examples=30)
@@ -269,7 +270,7 @@ def test_units_in_the_names_of_columns_and_given(tmp_path):
     (one,) = CloudSource(str(tmp_path / "a.csv")).frames(RASTER)
     (other,) = CloudSource(str(tmp_path / "b.csv"), units=units).frames(RASTER)
     np.testing.assert_array_equal(one.material, other.material)
-    np.testing.assert_allclose(one.fields["temperature"], other.fields["temperature"], rtol=1e-6)
+    np.testing.assert_allclose(one.fields["temperature"], other.fields["temperature"], rtol=SINGLE)
     assert np.nanmin(one.fields["plastic_strain"]) > 0.4
     assert np.nanmax(one.fields["plastic_strain"]) < 0.7
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from refusals import PNG, refused_on
+from tolerances import SINGLE
 
 from chipglow.io.sources import SourceError
 from chipglow.scene import Raster
@@ -39,7 +40,7 @@ def test_grids_come_back(whole, name):
     for number, frame in enumerate(frames):
         assert frame.time == pytest.approx(1e-6 * number)
         expected = 400.0 + 10.0 * x + 5.0 * y + 20.0 * number
-        np.testing.assert_allclose(frame.fields["temperature"], expected, rtol=1e-6)
+        np.testing.assert_allclose(frame.fields["temperature"], expected, rtol=SINGLE)
         assert (frame.material == 1).all()
     np.testing.assert_array_equal(
         next(source.frames(GRID, len(frames) - 1)).fields["temperature"],

@@ -15,6 +15,7 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 from PIL import Image
 from refusals import refused_on
+from tolerances import SINGLE
 
 from chipglow.io.sources import Placement, Units
 from chipglow.io.sources.conventions import SI_UNITS
@@ -226,7 +227,7 @@ def test_axes_and_directions_from_the_file(tmp_path):
     assert source.survey().found["plastic_strain"].endswith("PEEQ")
     for frame in source.frames(INNER):
         expected = linear(INNER.x, INNER.y, frame.time) / 1000
-        np.testing.assert_allclose(frame.fields["plastic_strain"], expected, rtol=1e-6)
+        np.testing.assert_allclose(frame.fields["plastic_strain"], expected, rtol=SINGLE)
 
 
 def test_placement_turns_positions_and_vectors(tmp_path):
@@ -326,7 +327,7 @@ def test_fields_in_files_of_their_own(tmp_path):
     source = a_source(files, names={"plastic_strain": "one"})
     (frame, *_) = source.frames(INNER)
     strain, temperature = frame.fields["plastic_strain"], frame.fields["temperature"]
-    np.testing.assert_allclose(strain, temperature / 100, rtol=1e-6)
+    np.testing.assert_allclose(strain, temperature / 100, rtol=SINGLE)
     np.save(tmp_path / "a.npy", a_stack()[:, :-1])
     refused(source, "b.h5: one: has [4, 6, 7] samples along time, y, x, expected [4, 5, 7]")
 

@@ -8,6 +8,7 @@ from cgns_file import write_cgns
 from exodus_file import write_exodus
 from foam_case import write_foam
 from plane_mesh import HEIGHT, RASTER, WIDTH, X, Y, only_frame, temperature
+from tolerances import SINGLE
 
 from chipglow.io.importing import Import, prospect
 from chipglow.io.sandbox import Isolated
@@ -155,8 +156,8 @@ def test_units_and_placement(tmp_path):
     frame = only_frame(source)
     found = frame.fields["temperature"][:, ::-1]
     np.testing.assert_allclose(found, temperature(X, Y), atol=3e-4)
-    np.testing.assert_allclose(frame.fields["velocity_x"], -3.0, rtol=1e-6)
-    np.testing.assert_allclose(frame.fields["velocity_y"], 1.0, rtol=1e-6)
+    np.testing.assert_allclose(frame.fields["velocity_x"], -3.0, rtol=SINGLE)
+    np.testing.assert_allclose(frame.fields["velocity_y"], 1.0, rtol=SINGLE)
 
 
 @pytest.mark.parametrize(

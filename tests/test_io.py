@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 from hypothesis import HealthCheck, given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
+from tolerances import DOUBLE
 
 from chipglow.camera.measurement import Measurement
 from chipglow.io import (
@@ -88,7 +89,7 @@ def leftovers(folder):
 
 def test_scene_comes_back(tmp_path):
     scene = open_scene(a_file(tmp_path))
-    np.testing.assert_allclose(scene.raster.extent, RASTER.extent, rtol=1e-12)
+    np.testing.assert_allclose(scene.raster.extent, RASTER.extent, rtol=DOUBLE)
     assert scene.raster.shape == RASTER.shape
     assert scene.tool == ToolGeometry()
     assert scene.data.attrs["study"] == "one"

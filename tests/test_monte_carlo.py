@@ -75,6 +75,7 @@ def test_the_calibration_of_a_mass_is_not_validated_to_first_order():
     found, first = of(deviation, *inputs), propagate(deviation, *inputs)
     assert found.mean == pytest.approx(1.2341, abs=0.0005)
     assert found.standard_uncertainty == pytest.approx(0.0754, abs=0.0005)
+    # Half of the last printed digit.
     assert first.standard_uncertainty == pytest.approx(0.0539, abs=5e-5)
     assert not found.validates(first)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import erf
 from synthetic_edge import edge_radiance, gaussian_edge, image_of, tailed_edge
+from tolerances import DOUBLE
 
 from chipglow.camera import MeasuredPSF
 from chipglow.laboratory.psf import knife_edge, psf_kernel, write_psf
@@ -55,7 +56,7 @@ def test_the_file_keeps_the_components(gaussian, tmp_path):
     psf = psf_kernel(gaussian)
     write_psf(gaussian, tmp_path / "psf.nc", psf)
     again = MeasuredPSF.from_file(tmp_path / "psf.nc")
-    np.testing.assert_allclose(again.weights, psf.weights, rtol=1e-12)
+    np.testing.assert_allclose(again.weights, psf.weights, rtol=DOUBLE)
     assert again.estimate.names == psf.estimate.names
     assert encircled(again, 5e-6).standard_uncertainty > 1e-4
     away = encircled(again, 5e-6) - encircled(psf, 5e-6)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.integrate import quad
 from scipy.special import j0
+from tolerances import DOUBLE
 
 from chipglow.camera import AiryAperture, AnnularAperturePSF, Pupil, PupilPSF
 from chipglow.camera.optics.pupil import annular_transfer, zernike_polynomial
@@ -157,7 +158,7 @@ def test_zernike_polynomials_are_in_the_order_of_noll():
         22: sqrt(7) * (20 * r**6 - 30 * r**4 + 12 * r**2 - 1),
     }
     for index, expected in table.items():
-        assert zernike_polynomial(index, r, t) == pytest.approx(expected, rel=1e-12)
+        assert zernike_polynomial(index, r, t) == pytest.approx(expected, rel=DOUBLE)
 
 
 def test_wavelengths_count_as_in_the_radiance():

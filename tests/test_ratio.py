@@ -11,6 +11,7 @@ from figure6 import figure_6
 from hypothesis import given, settings, strategies as st
 from scipy.integrate import simpson
 from scipy.optimize import brentq
+from tolerances import DOUBLE
 
 from chipglow import camera as cam
 from chipglow.analysis import (
@@ -78,7 +79,7 @@ def test_the_ratio_gives_the_temperature_back_whatever_the_emissivity(kelvins, e
     found = thermometer.temperature(first, emissivity * LONG.radiance(kelvins))
     assert found == pytest.approx(kelvins, abs=1e-6)
     assert thermometer.ratio(kelvins) == pytest.approx(
-        first / (emissivity * LONG.radiance(kelvins)), rel=1e-12
+        first / (emissivity * LONG.radiance(kelvins)), rel=DOUBLE
     )
 
 
@@ -265,7 +266,7 @@ def test_the_causes_add_up_to_what_is_measured():
     slope = scene(900.0 + GRADIENT * RASTER.x + RATE * np.arange(4)[:, None, None] * 1e-6)
     errors = ratio_errors(camera, slope, METAL, 0.0)
     (first, second), temperature = measured(camera, slope, METAL, 0.0)
-    np.testing.assert_allclose(errors.measured, temperature[0], rtol=1e-12)
+    np.testing.assert_allclose(errors.measured, temperature[0], rtol=DOUBLE)
     np.testing.assert_array_equal(first.raster.x, errors.x)
     assert second.raster.left - first.raster.left == pytest.approx(1.5e-6)
     assert all(np.ptp(values) > 1e-3 for values in errors.step.values)

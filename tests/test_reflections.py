@@ -6,6 +6,7 @@ from math import sqrt
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from tolerances import DOUBLE
 
 from chipglow.camera import Camera, SpectralView, expose
 from chipglow.radiometry import Band
@@ -148,7 +149,7 @@ def test_a_groove_of_mirrors_by_counting_images(angle):
     bisector = (np.cos(turn / 2), np.sin(turn / 2))
     found = exchange.incident(np.ones(60), CHIP, 0.0, 1.0, bisector)
     near_vertex = CHIP + (1 - CHIP) * found[25:35]
-    np.testing.assert_allclose(near_vertex, 1 - (1 - CHIP) ** count, rtol=1e-12)
+    np.testing.assert_allclose(near_vertex, 1 - (1 - CHIP) ** count, rtol=DOUBLE)
 
 
 @pytest.mark.parametrize("mirror", [0.0, 0.4, 1.0])

@@ -330,7 +330,7 @@ def test_a_contact_that_reaches_the_border_is_a_least_length(result):
     assert row.cells["mean"] == f"more than {row.here:.0f} µm"
     assert row.cells["interval"] == "–"
     assert "continues beyond" in row.explanation
-    rows = {"errors": [], "cut": [row], "chip": [], "camera": []}
+    rows = {"errors": [], "cut": [row], "corrected": [], "chip": [], "camera": []}
     assert summary(rows, result, {}, {}).lower_bounds == ["contact_length_um"]
 
 

@@ -59,6 +59,20 @@ def test_the_page_states_the_errors_of_the_quick_study(results):
         assert re.search(rf"\| −{stated[2]} ± \d+ \| −\d+ to −\d+ \|", page), name
 
 
+def test_rake_face_and_shear_band_are_corrected_on_the_page(results):
+    corrected = json.loads((results / "summary.json").read_text(encoding="utf-8"))["corrected"]
+    page = (results / "report.html").read_text(encoding="utf-8")
+    for place in ("rake_face", "shear_band"):
+        measured, found, true = (
+            corrected[f"{place}_{name}_degC"] for name in ("measured", "corrected", "true")
+        )
+        assert abs(found - true) < 0.2 * abs(measured - true)
+        assert f"the true temperature is {true:.0f}\u00a0°C" in page
+    # 95 % are promised; a texture's grain leaves about 80 independent pixels: three deviations.
+    assert min(corrected["chip_1_held_percent"], corrected["chip_2_held_percent"]) > 95 - 3 * 2.4
+    assert 'id="correction"' in page and 'id="corrected-lines"' in page
+
+
 def test_chip_is_segmented_as_the_study_needs(results):
     here = json.loads((results / "summary.json").read_text(encoding="utf-8"))["results"]
     # 30 000 /s is where the paper's emissivity map is wholly shear band.

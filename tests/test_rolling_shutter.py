@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from tolerances import DOUBLE
 
 from chipglow.camera import AnnularAperturePSF, Camera, GaussianPSF
 from chipglow.scene import Raster, Scene
@@ -80,7 +81,7 @@ def test_a_still_scene_is_the_same(moving):
             camera(psf=psf, line_time=line_time, integration_time=2.3e-6).measure(still, BLACK, 0.0)
             for line_time in (0.7e-6, None)
         )
-        np.testing.assert_allclose(found.radiance, expected.radiance, rtol=1e-12)
+        np.testing.assert_allclose(found.radiance, expected.radiance, rtol=DOUBLE)
 
 
 def test_rows_beside_the_pixels_go_with_the_nearest(moving):

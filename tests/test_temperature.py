@@ -8,6 +8,7 @@ import xarray as xr
 from command import typed, words
 from drawn import in_a_notebook, on_given_axes, on_new_axes, points_of
 from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
+from tolerances import DOUBLE
 
 from chipglow.camera import CalibrationErrors, Flag, LinearCalibration, Measurement
 from chipglow.io import write_measurement
@@ -302,7 +303,7 @@ def test_a_line_comes_back_from_its_file_with_its_covariance(tmp_path):
     em.write_emissivity(em.RegionEmissivities(maps, tuple((r,) for r in rows)), tmp_path / "e.nc")
     stored = em.read_emissivity_lines(tmp_path / "e.nc")["chip"]
     assert stored.heatings == tuple(replace(one, drift=None) for one in line.heatings)
-    np.testing.assert_allclose(stored.estimate.values, line.estimate.values, rtol=1e-12)
+    np.testing.assert_allclose(stored.estimate.values, line.estimate.values, rtol=DOUBLE)
     np.testing.assert_allclose(stored.estimate.covariance(), line.estimate.covariance(), rtol=1e-9)
     assert (stored.estimate - line.estimate).standard_uncertainty == pytest.approx(0.0, abs=1e-12)
     assert stored.estimate.warnings == line.estimate.warnings

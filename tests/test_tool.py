@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings, strategies as st
 from matplotlib.path import Path as Polygon
+from tolerances import DOUBLE
 
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow
 from chipglow.io import SceneWriter, open_scene, read_tool_outline, write_scene
@@ -193,7 +194,9 @@ def test_the_lowest_point_is_on_the_cut_surface(tool):
 
 def test_the_middle_of_a_round_edge_is_its_edge_point():
     tool = ToolGeometry()
-    np.testing.assert_allclose(tool.edge_point, tool.edge_radius * (1 - 1 / np.sqrt(2)), rtol=1e-12)
+    np.testing.assert_allclose(
+        tool.edge_point, tool.edge_radius * (1 - 1 / np.sqrt(2)), rtol=DOUBLE
+    )
     assert BREAKER.signed_distance(*BREAKER.edge_point) == pytest.approx(0.0, abs=1e-15)
 
 

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from hypothesis import given, settings, strategies as st
 from scipy.special import stdtrit
+from tolerances import DOUBLE
 
 from chipglow.uncertainty import Cause, Component, Estimate, draw, from_xarray, propagate, to_xarray
 
@@ -104,8 +105,8 @@ def test_a_covariance_of_values_of_very_different_sizes_is_kept():
     sizes = np.array([2e4, 1e-12, 1.0])
     matrix = correlation * np.outer(sizes, sizes)
     found = Estimate.from_covariance([1.0, 1.0, 1.0], matrix, "fit")
-    np.testing.assert_allclose(found.covariance(), matrix, rtol=1e-12)
-    np.testing.assert_allclose(found.correlation(), correlation, rtol=1e-12)
+    np.testing.assert_allclose(found.covariance(), matrix, rtol=DOUBLE)
+    np.testing.assert_allclose(found.correlation(), correlation, rtol=DOUBLE)
 
 
 CELSIUS = [21.521, 22.012, 22.512, 23.003, 23.507, 23.999, 24.513, 25.002, 25.503, 26.010, 26.511]
@@ -119,12 +120,14 @@ def test_h3_calibration_of_a_thermometer():
     solve = np.linalg.pinv(design)
     residual = np.array(CORRECTIONS) - design @ (solve @ CORRECTIONS)
     scatter = np.sqrt(residual @ residual / 9)
+    # Half of the last printed digit.
     assert scatter == pytest.approx(0.0035, abs=5e-5)
     observed = Estimate(CORRECTIONS).with_component(
         "scatter about the line", scatter, per_element=True, degrees_of_freedom=9
     )
     line = observed.linear(solve)
     np.testing.assert_allclose(line.values, [-0.1712, 0.00218], atol=(5e-5))
+    # Half of the last printed digit.
     assert line.values[1] == pytest.approx(0.00218, abs=5e-6)
     assert line.standard_uncertainty[0] == pytest.approx(0.0029, abs=5e-5)
     assert line.standard_uncertainty[1] == pytest.approx(0.00067, abs=5e-6)
@@ -222,6 +225,7 @@ def test_degrees_of_freedom_are_of_each_error_or_of_all():
     apart = values.with_component("noise", 1.0, pooled=False, **more).mean()
     assert together.degrees_of_freedom == pytest.approx(4.0)
     assert apart.degrees_of_freedom == pytest.approx(40.0)
+    # Printed with six decimals.
     assert Estimate(1.0).coverage_factor() == pytest.approx(1.959964, abs=1e-6)
 
 

@@ -1,9 +1,9 @@
-"""The picture of the app's page.
+"""The pictures of the app's page: errors, and the corrected image.
 
     python docs/pictures/app.py [FOLDER]
 
 Serves the scene that comes with the app and takes pictures of it in headless Chromium, at 1280 and
-1920 pixels, on light and on dark ground: into the folder, or only the page's own beside it.
+1920 pixels, on light and on dark ground: into the folder, or only the page's own two beside it.
 """
 
 import os
@@ -32,6 +32,7 @@ def main(folder):
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
         if folder is None:
             take(browser, url, SIZES[0], "light", HERE / "app.png")
+            take_correction(browser, url, HERE / "app-correction.png")
         else:
             for size in SIZES:
                 for theme in ("light", "dark"):
@@ -49,6 +50,20 @@ def take(browser, url, size, theme, file):
     page.locator("#status", has_text="Exact picture").wait_for()
     page.get_by_role("table", name="Parts of the error").wait_for()
     page.locator(".numbers.old").wait_for(state="detached")
+    page.wait_for_timeout(1000)
+    page.screenshot(path=file)
+    page.close()
+
+
+def take_correction(browser, url, file):
+    """Take the picture of the corrected image at the rake face."""
+    width, height = SIZES[0]
+    page = browser.new_page(viewport={"width": width, "height": height}, color_scheme="light")
+    page.set_default_timeout(180_000)
+    page.goto(f"{url}&images=correction&surface=chip+2")
+    page.locator("#status", has_text="Corrected: ").wait_for()
+    page.get_by_role("table", name="Corrected").wait_for()
+    page.get_by_role("button", name="Rake face").click()
     page.wait_for_timeout(1000)
     page.screenshot(path=file)
     page.close()

@@ -32,6 +32,7 @@ from chipglow.camera import (
     ReadNoise,
     ShotNoise,
 )
+from chipglow.camera.measuring import read_radiance
 from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import HEAT, SIGNED
 from chipglow.scene import Raster
@@ -71,7 +72,8 @@ with style():
     panels = figure.subplots(2, 5, sharex=True, sharey=True)
     extent = tuple(1e6 * side for side in CAMERA.pixels(SCENE).extent)
     for (over, under), (name, detector) in zip(panels.T, shown.items(), strict=True):
-        read, _ = replace(CAMERA, detector=detector).read(image[None], np.zeros(1))
+        camera = replace(CAMERA, detector=detector)
+        read, _ = read_radiance(camera, image[None], np.zeros(1))
         kelvins = np.asarray(CAMERA.band.temperature(read[0]))
         picture = over.imshow(kelvins - 273.15, extent=extent, cmap=HEAT, vmin=300, vmax=470)
         over.set_title(name, fontsize=9)

@@ -694,7 +694,7 @@ def _scene_warnings(task: _Task, cut: Cut | None) -> Iterator[str]:
     """Yield sentences on the scene and on the emissivity of the surfaces."""
     scene, camera = task.scene, task.camera
     if cut is not None:
-        yield from resolution_warnings(scene, cut.band_width)
+        yield from resolution_warnings(scene)
     if sparse := sparse_frames(scene, camera.integration_time):
         yield sparse
     origins = [surface.origin for surface in task.surfaces.values()]

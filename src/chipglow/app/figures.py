@@ -19,7 +19,7 @@ from bokeh.models import (
 from bokeh.palettes import Cividis256, Inferno256, RdBu11, interp_palette
 from bokeh.plotting import figure
 
-from chipglow.app.controls import CURSOR, LINES
+from chipglow.app.controls import CORRECTION_IMAGES, CURSOR, LINES
 from chipglow.app.pictures import Drawn, Panel, Picture
 from chipglow.drawing.scales import HEAT, PLAIN, SIGNED
 from chipglow.quantities import Array
@@ -35,6 +35,8 @@ TITLES: Final = {
     "scene": "Scene: true temperature / °C",
     "measured": "Measured radiance temperature / °C",
     "error": "Error / K",
+    "corrected": "Corrected temperature / °C",
+    "half_width": f"{CORRECTION_IMAGES['half-width']} / K",
 }
 
 TEXT: Final = {"light": "#16191d", "dark": "#e8eaed"}
@@ -190,7 +192,7 @@ class Figures:
         }
         self.images = {name: Image(name, ranges, name == images[0]) for name in images}
         self.lines = {
-            name: Line(name, f"Temperature {where}", len(images) > 1)
+            name: Line(name, f"Temperature {where}", "error" in images)
             for name, where in along.items()
         }
         self.all = {name: one.figure for name, one in (self.images | self.lines).items()}

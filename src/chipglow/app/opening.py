@@ -12,12 +12,13 @@ import numpy as np
 from chipglow.analysis import spread_starts
 from chipglow.analysis.cut import lacking, middle_start
 from chipglow.analysis.places import LINE_REACH, TOUCHING
-from chipglow.app.controls import CURSOR, LINES, Controls, rounded, shown_study
-from chipglow.app.pictures import MeasurementModel, Model, SceneModel, with_samples
+from chipglow.app.controls import CORRECTION, CURSOR, LINES, Controls, rounded, shown_study
+from chipglow.app.pictures import CorrectionModel, MeasurementModel, Model, SceneModel, with_samples
 from chipglow.camera import Measurement
 from chipglow.chip import Instant, Segment
+from chipglow.correction import Correction, is_correction, read_correction
 from chipglow.io import StoredScene, example_scene, is_measurement, open_scene, read_measurement
-from chipglow.quantities import unchecked
+from chipglow.quantities import Array, unchecked
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study
 from chipglow.surface import UniformSurface
@@ -70,17 +71,32 @@ def scene_model(
 def measurement_model(measurement: Measurement, name: str) -> MeasurementModel:
     """Open a measurement with cursor and lines through the hottest pixel of its first frame."""
     first = np.asarray(measurement.data["radiance_temperature"][0].values, np.float64)
-    usable = np.where(measurement.usable[0], first, -np.inf)
-    raster = measurement.raster
-    row, column = np.unravel_index(int(np.argmax(usable)), usable.shape)
-    hottest = (raster.x[column], raster.y[row]) if np.isfinite(usable).any() else None
-    study = _with_places(Study(), raster, *_through(raster, hottest))
-    controls = Controls.of_measurement(study, measurement.times, raster)
+    usable = np.where(measurement.usable[0], first, np.nan)
+    study = _at_the_hottest(Study(), usable, measurement.raster)
+    controls = Controls.of_measurement(study, measurement.times, measurement.raster)
     return MeasurementModel(name, measurement, controls)
 
 
+def correction_model(correction: Correction, name: str) -> CorrectionModel:
+    """Open a correction with cursor and lines through the hottest pixel of its first frame."""
+    data, raster = correction.data, correction.raster
+    study = _at_the_hottest(
+        shown_study(Study(), images=CORRECTION), data["temperature"][0].values, raster
+    )
+    controls = Controls.of_measurement(study, data["time"].values, raster)
+    return CorrectionModel(name, correction, controls)
+
+
+def _at_the_hottest(study: Study, kelvins: Array, raster: Raster) -> Study:
+    """Return a study with cursor and lines through the hottest pixel of an image."""
+    if not np.isfinite(kelvins).any():
+        return _with_places(study, raster, *_through(raster))
+    row, column = np.unravel_index(int(np.nanargmax(kelvins)), kelvins.shape)
+    return _with_places(study, raster, *_through(raster, (raster.x[column], raster.y[row])))
+
+
 def open_any(path: Scene | str | Path | None, study: Study | None = None) -> Model:
-    """Open a scene, a measurement or a folder of results; without a path the bundled scene."""
+    """Open a scene, a measurement, a correction or results; without a path the bundled scene."""
     if path is None:
         return open_scene_object(example_scene(), study, "bundled scene")
     if isinstance(path, Scene):
@@ -90,6 +106,8 @@ def open_any(path: Scene | str | Path | None, study: Study | None = None) -> Mod
         return _results(path)
     if _is_study(path.name):
         return _study(path, path.name)
+    if is_correction(path):
+        return correction_model(read_correction(path), path.name)
     if is_measurement(path):
         return measurement_model(read_measurement(path), path.name)
     return open_scene_object(open_scene(path), study, path.name)

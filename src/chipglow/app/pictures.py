@@ -83,7 +83,7 @@ class Panel(Brief):
 
 @dataclass(frozen=True)
 class CorrectedPixel:
-    """A corrected pixel: temperatures in K, expanded uncertainty, and uncertainty by source."""
+    """A corrected pixel: temperatures in K (NaN: unknown), expanded uncertainty, and by source."""
 
     temperature: float
     expanded_uncertainty: float
@@ -93,29 +93,42 @@ class CorrectedPixel:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Corrected(Brief):
-    """A part of an image, corrected, and its true temperature in K."""
+    """A part of an image, corrected, and its true temperature in K if it is known."""
 
     correction: Correction
-    true: Array
+    true: Array | None = None
+    frame: int = 0
+
+    @property
+    def data(self) -> xr.Dataset:
+        """The frame of the correction."""
+        return self.correction.data.isel(time=self.frame)
 
     def image(self, name: str) -> Array:
         """Return one of `CORRECTION_IMAGES`, or the corrected temperature, in K."""
-        data = self.correction.data.isel(time=0)
+        data = self.data
         temperature = np.asarray(data["temperature"].values, np.float64)
         if name == "half-width":
             return np.asarray((data["upper"].values - data["lower"].values) / 2)
-        shown = np.where(np.isnan(temperature), nan, self.true)
-        images = {"corrected": temperature, "true": shown, "error": temperature - self.true}
-        return images[name]
+        if name == "corrected":
+            return temperature
+        assert self.true is not None
+        return (
+            temperature - self.true
+            if name == "error"
+            else np.where(np.isnan(temperature), nan, self.true)
+        )
 
     def at(self, place: tuple[float, float]) -> CorrectedPixel | None:
         """Return the pixel at x and y in m; None without a corrected temperature."""
         try:
-            estimate = self.correction.at(place)
+            estimate = self.correction.at(place, self.frame)
         except ValueError:
             return None
-        budget = self.correction.budget(place)
-        true = float(nearest(self.true, self.correction.raster, place))
+        budget = self.correction.budget(place, self.frame)
+        true = nan
+        if self.true is not None:
+            true = float(nearest(self.true, self.correction.raster, place))
         return CorrectedPixel(
             float(estimate.values),
             float(estimate.expanded_uncertainty()),
@@ -168,6 +181,15 @@ class SceneModel:
     controls: Controls
     file: str | None  # the scene as a saved study names it; None for the study's cut
     images: ClassVar[tuple[str, ...]] = ("scene", "measured", "error")
+
+    @property
+    def raster(self) -> Raster:
+        return self.scene.raster
+
+    @property
+    def tool(self) -> Tool | None:
+        return self.scene.tool
+
     _caches: dict[str, dict[Hashable, Any]] = field(
         init=False, default_factory=lambda: defaultdict(dict), repr=False
     )
@@ -450,6 +472,14 @@ class MeasurementModel:
     coarse: ClassVar[None] = None
 
     @property
+    def raster(self) -> Raster:
+        return self.measurement.raster
+
+    @property
+    def tool(self) -> Tool | None:
+        return self.measurement.tool
+
+    @property
     def images(self) -> tuple[str, ...]:
         """Names of the images."""
         return ("measured", "error") if REFERENCE in self.measurement.data else ("measured",)
@@ -492,7 +522,52 @@ class MeasurementModel:
         return int(np.abs(self.measurement.times - state.study.start).argmin())
 
 
-Model: TypeAlias = SceneModel | MeasurementModel
+@dataclass(eq=False)
+class CorrectionModel:
+    """A correction that `chipglow correct` wrote, its controls, and its frames as pictures."""
+
+    name: str
+    correction: Correction
+    controls: Controls
+    coarse: ClassVar[None] = None
+    tool: ClassVar[None] = None
+    images: ClassVar[tuple[str, ...]] = ("measured", "corrected", "half_width")
+
+    @property
+    def raster(self) -> Raster:
+        return self.correction.raster
+
+    def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
+        """Return the frame that began nearest to the state's start."""
+        frame = int(np.abs(self.correction.data["time"].values - state.study.start).argmin())
+        corrected, raster = Corrected(self.correction, frame=frame), self.raster
+        measured = corrected.data["measured"].values
+        data = xr.Dataset(
+            {"measured": (("y", "x"), measured), "flagged": (("y", "x"), np.isnan(measured))}
+        )
+        picture = Picture(
+            state, raster, data, {"measured": _measured_panel(data, raster)},
+            _lines(state, raster, data), {}, corrected=corrected,
+        )  # fmt: skip
+        shown = _with_correction(picture, corrected)
+        before = shown.panels
+        panels = {
+            "measured": before["scene"],
+            "corrected": before["measured"],
+            "half_width": before["error"],
+        }
+        return replace(shown, panels=panels)
+
+    def numbers(self, picture: Picture) -> dict[str, float]:
+        """Return the measured temperature at the cursor in K."""
+        return _at(picture.data, picture.raster, picture.state.cursor)
+
+    def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
+        """Return nothing: an error is not known without the truth."""
+        return {}
+
+
+Model: TypeAlias = SceneModel | MeasurementModel | CorrectionModel
 
 
 def with_samples(scene: Scene, count: int, fewer_frames: bool = False) -> Scene:
@@ -549,11 +624,14 @@ def _corrected_line(picture: Picture, corrected: Corrected | None, name: str) ->
     """Return the corrected temperature along a line, its interval and the true one in °C."""
     if corrected is None:
         return {"reference": np.full_like(picture.lines[name]["along"], nan)}
-    data = corrected.correction.data.isel(time=0).assign(true=(("y", "x"), corrected.true))
+    data = corrected.data
+    if corrected.true is not None:
+        data = data.assign(true=(("y", "x"), corrected.true))
     line = picture.state.line(name).line(picture.raster.spacing)
     return {
         key: sample(data[variable].values, corrected.correction.raster, line.points) - ZERO_CELSIUS
         for key, variable in _LINE_OF.items()
+        if variable in data
     }
 
 

@@ -170,9 +170,9 @@ class Session:
 
     def _correct(self, picture: Picture, numbers: dict[str, float]) -> None:
         """Send the picture again with the corrected image, unless it has it already."""
-        assert isinstance(self.model, SceneModel)
         if picture.corrected is not None:
             return
+        assert isinstance(self.model, SceneModel)
         self._notify("correcting")
         corrected = self.model.corrected(picture, self._pictures.check)
         self._send(corrected)

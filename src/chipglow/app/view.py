@@ -76,11 +76,9 @@ class PageView:
             self.session.restore(texts or {})
         except ValueError as error:
             self._refused = f"Link: {error}"
-        shown = opened.scene if isinstance(opened, SceneModel) else opened.measurement
-        self.figures = Figures(shown.raster, shown.tool, opened.images)
+        self.figures = Figures(opened.raster, opened.tool, opened.images)
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
-        self._on_painted, self._on_theme = self.session.painted, self.figures.set_theme
         self._show_opened = partial(self._send, "open")
         self._show_failed = partial(self._say, kind="error")
         self._handled = 0
@@ -114,9 +112,25 @@ class PageView:
     def _receive(self, event: Any) -> None:
         self._later(lambda: self._act(event.data))
 
+    @property
+    def _handlers(self) -> Mapping[str, Callable[[Any], None]]:
+        """What answers a message of the page, by its kind; other kinds are a KeyError."""
+        return {
+            "ready": self._on_ready,
+            "change": self._on_change,
+            "step": self._on_step,
+            "draw": self._on_draw,
+            "cancel": self._on_cancel,
+            "chip": self._on_chip,
+            "save": self._on_save,
+            "piece": self._on_piece,
+            "painted": self.session.painted,
+            "theme": self.figures.set_theme,
+        }
+
     def _act(self, message: dict[str, Any]) -> None:
         self._handled = int(message["n"])
-        getattr(self, f"_on_{message['kind']}")(message.get("content"))
+        self._handlers[message["kind"]](message.get("content"))
 
     def _notified(self, kind: str, *content: Any) -> None:
         self._later(lambda: getattr(self, f"_show_{kind}")(*content))
@@ -242,7 +256,8 @@ class PageView:
         if picture.corrected is not None:
             raster = picture.corrected.correction.raster
             size = f"{raster.columns} × {raster.rows}"
-            return f"Corrected: {size} pixels around the cursor.", ""
+            around = "" if raster == picture.raster else " around the cursor"
+            return f"Corrected: {size} pixels{around}.", ""
         if picture.state.study.images == CORRECTION:
             return "Exact picture; the correction follows.", "busy"
         if shown in picture.absent:

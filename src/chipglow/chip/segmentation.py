@@ -10,7 +10,6 @@ import scipy  # its signal part is slow to import, and loaded at its first use
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from chipglow.cutting import unresolved
 from chipglow.quantities import Array, Brief, quotient
 from chipglow.scene import Scene
 from chipglow.scene.scene import FORCE_UNITS
@@ -181,8 +180,6 @@ def _values(scene: Scene, name: str) -> Array:
     return np.asarray(scene.data[name].values, dtype=np.float64)
 
 
-def resolution_warnings(scene: Scene, band_width: float = nan) -> tuple[str, ...]:
+def resolution_warnings(scene: Scene) -> tuple[str, ...]:
     """Return sentences about lengths of a cut that its grid does not resolve."""
-    known = str(scene.data.attrs.get("resolution_warnings", ""))
-    cell = float(scene.data.attrs.get("cell", 0.0))
-    return (*known.splitlines(), *unresolved({"shear band": band_width}, cell))
+    return tuple(str(scene.data.attrs.get("resolution_warnings", "")).splitlines())

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from enum import IntFlag
-from html import escape
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.scene import Raster, Region
 from chipglow.scene.scene import raster_of
-from chipglow.text import Notes
+from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Cause, Component, Estimate
 
 if TYPE_CHECKING:
@@ -77,7 +76,34 @@ class Correction:
         return f"<Correction: {frames} frames of {columns} x {rows} pixels>"
 
     def _repr_html_(self) -> str:
-        return f"<pre>{escape(repr(self))}</pre>{self.data._repr_html_()}"
+        return result_html(repr(self).strip("<>"), self._overview(), self.notes)
+
+    def _overview(self) -> pd.DataFrame:
+        """Return one row for each frame: its pixels, its hottest one, and a usual half-width."""
+        rows = []
+        for frame, time in enumerate(self.data["time"].values.tolist()):
+            flags, data = self.flags[frame], self.data.isel(time=frame)
+            half = (data["upper"].values - data["lower"].values) / 2
+            celsius = data["temperature"].values - ZERO_CELSIUS
+            is_known = np.isfinite(celsius).any()
+            rows.append(
+                {
+                    "time / µs": 1e6 * time,
+                    "corrected pixels": int(np.count_nonzero(flags & UNDETERMINED == 0)),
+                    "below the range": int(np.count_nonzero(flags & CorrectionFlag.UPPER_BOUND)),
+                    "saturated": int(np.count_nonzero(flags & CorrectionFlag.LOWER_BOUND)),
+                    "hottest / °C": float(np.nanmax(celsius)) if is_known else np.nan,
+                    "median half-width (95 %) / K": float(np.nanmedian(half))
+                    if np.isfinite(half).any()
+                    else np.nan,
+                }
+            )
+        return pd.DataFrame(rows)
+
+    @property
+    def flags(self) -> NDArray[np.uint8]:
+        """Sums of `CorrectionFlag`, shape (time, y, x)."""
+        return np.asarray(self.data["flags"].values, np.uint8)
 
     @property
     def raster(self) -> Raster:
@@ -102,6 +128,7 @@ class Correction:
 
     def contribution(self, source: str, frame: int = 0) -> Array:
         """Return the standard uncertainty of each pixel by one source in K, shape (y, x)."""
+        self._check_frame(frame)
         if source not in self.sources:
             raise ValueError(f"source: {source!r}, expected one of {', '.join(self.sources)}")
         own = self.data["source"].values == source
@@ -114,8 +141,10 @@ class Correction:
         Raises
         ------
         ValueError
-            If the place is outside the image, or has no pixel with a corrected temperature.
+            If there is no such frame, or the place is outside the image or has no pixel with a
+            corrected temperature.
         """
+        self._check_frame(frame)
         mask = self._mask(place) & (self.data["flags"][frame].values & UNDETERMINED == 0)
         if not mask.any():
             raise ValueError("place: has no pixel with a corrected temperature")
@@ -137,8 +166,10 @@ class Correction:
         return budget.sort_values("standard_uncertainty", ascending=False, ignore_index=True)
 
     def to_frame(self, frame: int = 0) -> pd.DataFrame:
-        """Return one row for each pixel: place in m, temperature, interval and flags."""
+        """Return one row for each pixel: place in m, temperatures, interval and flags."""
+        self._check_frame(frame)
         names = ["temperature", "standard_uncertainty", "lower", "upper", "flags", "resolution"]
+        names = [name for name in ("measured", *names) if name in self.data]
         chosen = self.data[names].isel(time=frame).drop_vars("time", errors="ignore")
         return chosen.to_dataframe().reset_index()
 
@@ -146,9 +177,15 @@ class Correction:
         """Plot the corrected temperature of one frame in °C over x and y in µm."""
         from chipglow.scene.figures import plot_image
 
+        self._check_frame(frame)
         celsius = self.data["temperature"][frame].values - ZERO_CELSIUS
         time = float(self.data["time"].values[frame])
-        return plot_image(celsius, self.raster, None, "true temperature / °C", time, ax)
+        return plot_image(celsius, self.raster, None, "corrected temperature / °C", time, ax)
+
+    def _check_frame(self, frame: int) -> None:
+        count = self.data.sizes["time"]
+        if not -count <= frame < count:
+            raise ValueError(f"frame: is {frame}, expected 0 to {count - 1}")
 
     def _mask(self, place: Place) -> NDArray[np.bool_]:
         raster = self.raster
@@ -158,7 +195,10 @@ class Correction:
             return _pixel_at(place, raster)
         mask: Any = np.asarray(place)
         if mask.dtype != np.bool_ or mask.shape != raster.shape:
-            raise ValueError(f"place: expected a mask of shape {raster.shape}, a region or x and y")
+            raise ValueError(
+                "place: expected a region, a tuple of x and y in m, or a mask of shape "
+                f"{raster.shape}"
+            )
         return np.asarray(mask, np.bool_)
 
 

@@ -118,6 +118,10 @@ _INERTIA_SHARE: Final = 0.0045
 _MAX_MASS_SCALING: Final = 1000.0
 """Largest factor on the density that is chosen, for slow cuts."""
 
+_NO_BAND_WIDTH: Final = (
+    "The workpiece has no nonlocal viscosity: a shear band is about two cells wide, of any cell."
+)
+
 STEADY_TOLERANCE: Final = 1.0
 """Change in K of the contact's mean temperature, over the last rounds, under which a tool counts as
 steady."""
@@ -264,8 +268,12 @@ class CuttingSimulation(CutSettings):
     @property
     def resolution_warnings(self) -> tuple[str, ...]:
         """Sentences on lengths that fewer than `CELLS_NEEDED` cells resolve."""
-        lengths = (("feed", self.conditions.feed), ("edge radius", self.tool.corner_radius))
-        return unresolved(dict(lengths), self.numerics.cell)
+        lengths = {"feed": self.conditions.feed, "edge radius": self.tool.corner_radius}
+        resists = self.workpiece.nonlocal_viscosity
+        if resists is not None:
+            lengths["length of the nonlocal viscosity"] = resists.length
+            return unresolved(lengths, self.numerics.cell)
+        return (*unresolved(lengths, self.numerics.cell), _NO_BAND_WIDTH)
 
     @property
     def point_steps(self) -> float:

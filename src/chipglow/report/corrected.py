@@ -43,7 +43,13 @@ def sentences(facts: Facts, rows: Mapping[str, Row]) -> Iterator[str]:
     for window in windows:
         cells = _cells(rows, slug(window.surface), "rms_K")
         held = rows[f"{slug(window.surface)}_held_percent"].cells["mean"]
-        yield facts.text(words["window"], surface=window.surface, held=held, **cells)
+        yield facts.text(
+            words["window"],
+            surface=window.surface,
+            held=held,
+            uncertainty=window.emissivity_uncertainty,
+            **cells,
+        )
 
 
 def _cells(rows: Mapping[str, Row], start: str, end: str) -> dict[str, str]:
