@@ -466,3 +466,10 @@ def folder(tmp_path, monkeypatch):
 def test_the_command_refuses_in_one_line(folder, options, message):
     assert message in refusal(f"correct chip.nc {options} --out corrected.nc")
     assert not (folder / "corrected.nc").exists()
+
+
+def test_the_command_refuses_a_tool_outside_the_image(folder):
+    text = "tip: [5 mm, 5 mm]\nrake_angle: 0 deg\nclearance_angle: 7 deg\n"
+    (folder / "tool.yaml").write_text(text, "utf-8")
+    message = refusal("correct chip.nc --psf psf.nc --emissivity 0.42 --tool tool.yaml")
+    assert "--tool: tool.yaml is outside the image of x 0 to 72 um and y 0 to 72 um" in message
