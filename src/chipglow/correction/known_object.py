@@ -34,9 +34,8 @@ A kelvin changes an emissivity of 0.4 by 0.05 % (2e-4 1/K), and this a temperatu
 _LEAST: Final = 0.01
 """Least emissivity of a map: noise must not make it vanish."""
 
-_MARGIN: Final = 12
-"""Samples around a map to which its edge extends: the radiance beyond the image by four pixels is
-unknown too, and outlines may move."""
+_MARGIN: Final = 2
+"""Samples around a map to which its edge extends: outlines may move by as much."""
 
 _OUTSIDE: Final = "outside the map"
 _DARK: Final = Estimate(np.array(COLDEST))
@@ -75,7 +74,9 @@ class KnownObject(ObservedObject):
 
     def _at(self, x: Array, y: Array) -> tuple[Labels, Array]:
         labels = self.shapes.look_up(x, y)[0]
-        inside, *sample = _nearest(self.samples, x, y)
+        # Beyond the image, the emissivities of its edge continue.
+        left, right, bottom, top = self.shapes.pixels.extent
+        inside, *sample = _nearest(self.samples, x.clip(left, right), y.clip(bottom, top))
         labels = np.where(inside, labels, 0).astype(np.int16)
         _, *pixel = _nearest(self.shapes.pixels, x, y)
         warmer = self.warmer[(labels, *pixel)]
