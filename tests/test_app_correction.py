@@ -10,7 +10,7 @@ from chipglow.app.controls import CORRECTION_IMAGES
 from chipglow.app.files import study_file
 from chipglow.app.opening import open_any
 from chipglow.app.session import Session, SupersededError
-from chipglow.app.view import View
+from chipglow.app.view import PageView
 from chipglow.camera import Measurement
 from chipglow.correction import correct, observed_scene, surroundings_of, write_correction
 from chipglow.io import example_scene
@@ -157,7 +157,7 @@ def test_a_session_says_that_it_corrects_and_sends_the_picture_again(model, pict
 def test_a_corrected_file_opens_with_its_images_and_bars(picture, tmp_path):
     correction = picture.corrected.correction
     write_correction(correction, tmp_path / "corrected.nc")
-    view, sent = View(open_any(tmp_path / "corrected.nc")), []
+    view, sent = PageView(open_any(tmp_path / "corrected.nc")), []
     view.page._send_msg = sent.append
     session = view.session
     session._painted.set()

@@ -16,6 +16,7 @@ from chipglow.study.budgets import check_draws, errors_of, reader, readings_of
 from chipglow.study.running import Progress, fitted_study, silent
 from chipglow.study.schema import Study
 from chipglow.study.sweeps import (
+    Impossible,
     Method,
     axis,
     in_si,
@@ -228,11 +229,13 @@ class _Search:
     """Values of the readings at each setting, as far as they are drawn."""
 
     def __init__(
-        self, cases: Mapping[str, Study | str], scene: Scene, at: tuple[str, ...], seed: int
+        self, cases: Mapping[str, Study | Impossible], scene: Scene, at: tuple[str, ...], seed: int
     ) -> None:
         self.labels, self.studies = list(cases), list(cases.values())
         self.scene, self.at, self.seed = scene, at, seed
-        self.reasons = {n: one for n, one in enumerate(self.studies) if isinstance(one, str)}
+        self.reasons = {
+            n: one.reason for n, one in enumerate(self.studies) if isinstance(one, Impossible)
+        }
         self.names: tuple[str, ...] = ()
         self.numbers: dict[int, Array] = {}
         self.longest = self._longest()
@@ -240,7 +243,7 @@ class _Search:
     def extend(self, number: int, draws: int) -> None:
         """Read at a setting until it has this many draws."""
         study = self.studies[number]
-        if isinstance(study, str):
+        if isinstance(study, Impossible):
             return
         try:
             inputs = _inputs(study)
@@ -262,10 +265,10 @@ class _Search:
     def _longest(self) -> float | None:
         """Return the longest integration time for which the scene shows all places."""
         own, *others = self.studies
-        if isinstance(own, str):
+        if isinstance(own, Impossible):
             return None
         names = readings_of(own, self.scene, self.at).names
-        times = {one.camera.integration_time for one in others if not isinstance(one, str)}
+        times = {one.camera.integration_time for one in others if isinstance(one, Study)}
         for time in sorted(times, reverse=True):
             if time <= own.camera.integration_time:
                 break

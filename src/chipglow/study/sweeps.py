@@ -262,8 +262,15 @@ def sweep(
     return Sweep._stated(folder, text)
 
 
+@dataclass(frozen=True)
+class Impossible:
+    """A point at which there is no study, with the reason."""
+
+    reason: str
+
+
 def _compute(
-    tasks: Sequence[tuple[Study | str, tuple[str, ...], Path]],
+    tasks: Sequence[tuple[Study | Impossible, tuple[str, ...], Path]],
     client: Client | None,
     workers: int | None,
     tell: Progress,
@@ -304,13 +311,13 @@ def point_file(folder: Path, key: str) -> Path:
     return folder / _POINTS / f"{key}.json"
 
 
-def compute_point(study: Study | str, at: Sequence[str], path: Path) -> None:
+def compute_point(study: Study | Impossible, at: Sequence[str], path: Path) -> None:
     """Analyse a study and write its readings; an error is written with its reason."""
     if _is_done(path):
         return
     try:
-        if isinstance(study, str):
-            raise ValueError(study)
+        if isinstance(study, Impossible):
+            raise ValueError(study.reason)
         record = _numbers(run(study), at)
     except Exception as error:
         record = {"failed": f"{type(error).__name__}: {error}"}
@@ -370,16 +377,18 @@ def points_of(
         yield {path: between(values[0], values[-1], part) for (path, values), part in parts}
 
 
-def studies_at(study: Study, points: Sequence[Mapping[str, Any]]) -> list[Study | str]:
+def studies_at(study: Study, points: Sequence[Mapping[str, Any]]) -> list[Study | Impossible]:
     """Return the study of each point, or why it is impossible."""
-    studies: list[Study | str] = []
+    studies: list[Study | Impossible] = []
     for point in points:
         try:
             studies.append(changed(study, point))
         except (ValueError, LookupError) as error:
-            studies.append(f"{point_text(point)}: {error}")
-    if all(isinstance(one, str) for one in studies):
-        raise ValueError(studies[0])
+            studies.append(Impossible(f"{point_text(point)}: {error}"))
+    if isinstance(first := studies[0], Impossible) and not any(
+        isinstance(one, Study) for one in studies
+    ):
+        raise ValueError(first.reason)
     return studies
 
 
@@ -406,11 +415,11 @@ def quantity_of(study: Study, path: str) -> Quantity | None:
 
 
 def _key(
-    study: Study | str, at: Sequence[str], digest: Callable[[str], str] = content_digest
+    study: Study | Impossible, at: Sequence[str], digest: Callable[[str], str] = content_digest
 ) -> str:
     """Return the digest of all that determines a point's numbers."""
-    if isinstance(study, str):
-        return _digest(study)
+    if isinstance(study, Impossible):
+        return _digest(study.reason)
     content = adapter(Study).dump_python(study, mode="json")
     del content["title"], content["wavelengths"], content["uncertainty"]
     if study.scene is None:
