@@ -8,7 +8,6 @@ import typer
 
 from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
-from chipglow.quantities import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from chipglow.camera import FittedCalibration
@@ -111,6 +110,8 @@ def calibrate(
 
 
 def _print_fit(result: "BlackbodyCalibration", name: str) -> None:
+    from chipglow.quantities import ZERO_CELSIUS
+
     screen, fit = current(), result.fits[name]
     calibration = fit.calibration
     screen.heading(

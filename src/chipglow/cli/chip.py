@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
-from chipglow.quantities import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from chipglow.camera import Measurement
@@ -74,6 +73,8 @@ def chosen_frames(measurement: "Measurement", frame: str, at: float | None) -> l
 
 def _print_squares(grid: "RakeGrid") -> None:
     import pandas as pd
+
+    from chipglow.quantities import ZERO_CELSIUS
 
     several = grid.times.size > 1
     over = f"between {grid.times.size} frames" if several else "over a square's pixels"

@@ -8,7 +8,6 @@ from chipglow.cli import options as opt
 from chipglow.cli.chip import chosen_frames
 from chipglow.cli.emissivity import doubts, emissivities_of
 from chipglow.cli.screen import current, figure, finish
-from chipglow.quantities import ZERO_CELSIUS
 
 _LARGEST_MISFIT: Final = 4.0
 """Misfit above which the residuals are more than twice the noise: not by chance."""
@@ -261,6 +260,8 @@ def _doubts(result: "Correction") -> "Notes":
 
 
 def _print(result: "Correction", frame: "pd.DataFrame") -> None:
+
+    from chipglow.quantities import ZERO_CELSIUS
 
     screen = current()
     columns = {

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Final
 from chipglow.cli import options as opt
 from chipglow.cli.batch import common_notes, for_each, load_measurements
 from chipglow.cli.screen import current, figure, finish
-from chipglow.quantities import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,6 +86,7 @@ def emissivity(
 
 def _print_tables(result: "lab.RegionEmissivities") -> None:
     from chipglow.laboratory.emissivity.emissivity import BUDGET
+    from chipglow.quantities import ZERO_CELSIUS
 
     screen = current()
     columns = ["region", "pixels", "mean", "standard_deviation", "standard_uncertainty"]
@@ -111,6 +111,7 @@ def _print_tables(result: "lab.RegionEmissivities") -> None:
 
 def _print_study(result: "lab.RegionEmissivities", out: Path | None) -> None:
     from chipglow.laboratory import emissivity as lab
+    from chipglow.quantities import ZERO_CELSIUS
 
     text, head = lab.surface_text(result), "For a study"
     if text and len(result.maps) > 1:
@@ -250,6 +251,7 @@ def _correct(
     import pandas as pd
 
     from chipglow.cli.progress import progress_bars
+    from chipglow.quantities import ZERO_CELSIUS
     from chipglow.study import corrected_temperatures, load_study
 
     screen = current()
@@ -326,6 +328,8 @@ def _print(result: "lab.RegionTemperatures") -> None:
 
 
 def _celsius(rows: "pd.DataFrame") -> "pd.DataFrame":
+    from chipglow.quantities import ZERO_CELSIUS
+
     names = ("radiance_temperature", "true_temperature", "low", "high")
     return rows.assign(**{f"{name}_degC": rows[f"{name}_K"] - ZERO_CELSIUS for name in names})
 

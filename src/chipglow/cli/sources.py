@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from chipglow.cli import options as opt
 from chipglow.cli.screen import current, finish
-from chipglow.quantities import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     from chipglow.camera import Recording
@@ -75,11 +74,13 @@ def _convert_many(sources: list[Path], out: Path | None, settings: list[str], fo
     from chipglow.cli.batch import common_notes, for_each, output_files
     from chipglow.io import is_measurement, write_measurement
     from chipglow.laboratory.recordings import load_measurement
+    from chipglow.quantities import ZERO_CELSIUS
 
     targets = {} if out is None else output_files(sources, out, ".nc", force)
     notes = {}
 
     def converted(source: Path) -> dict[str, object]:
+
         if is_measurement(source):
             raise ValueError(f"{source}: already a measurement; expected a camera file")
         measurement = load_measurement(source, settings)
@@ -118,6 +119,7 @@ def _convert_many(sources: list[Path], out: Path | None, settings: list[str], fo
 
 def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:
     from chipglow.cli.showing import microseconds
+    from chipglow.quantities import ZERO_CELSIUS
 
     frames, rows, columns = recording.signal.shape
     first, last = map(microseconds, recording.times[[0, -1]])
