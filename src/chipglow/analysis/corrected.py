@@ -131,13 +131,22 @@ def corrected_windows(
 
 def _window(pixels: Raster, segment: Segment) -> tuple[tuple[slice, slice], Raster]:
     """Return the pixels around the first part of rake face and shear band."""
-    pitch = pixels.spacing
-    face = segment.tool.rake_point([0.0, min(_REACH * pitch, segment.contact_length)])
-    band = segment.band.ridge.points
-    near = np.hypot(*(band - segment.tool.rake_foot).T) <= _REACH * pitch
-    points = np.concatenate([face, band[near]])
-    margin = _MARGIN * pitch
+    face = segment.tool.rake_point([0.0, _face_length(pixels, segment)])
+    points = np.concatenate([face, _near_ridge(pixels, segment)])
+    margin = _MARGIN * pixels.spacing
     return around(pixels, np.stack([points.min(axis=0) - margin, points.max(axis=0) + margin]))
+
+
+def _face_length(pixels: Raster, segment: Segment) -> float:
+    """Return the length in m of the rake face that is corrected."""
+    return min(_REACH * pixels.spacing, segment.contact_length)
+
+
+def _near_ridge(pixels: Raster, segment: Segment) -> Array:
+    """Return the points of the ridge of the shear band that are corrected, (point, 2) in m."""
+    points = segment.band.ridge.points
+    near = np.hypot(*(points - segment.tool.rake_foot).T) <= _REACH * pixels.spacing
+    return np.asarray(points[near])
 
 
 def _found(surface: str, heated: tuple[HeatedObject, ...]) -> float:
@@ -194,16 +203,13 @@ def _beside_face(pixels: Raster, segment: Segment) -> NDArray[np.bool_]:
     """Return the pixels whose centres are within a pixel of the rake face, along the contact."""
     centres = np.stack(np.meshgrid(pixels.x, pixels.y), axis=-1)
     along, into_chip = segment.tool.face_coordinates(centres)
-    length = min(_REACH * pixels.spacing, segment.contact_length)
     beside = (into_chip > 0) & (into_chip < pixels.spacing)
-    return np.asarray(beside & (along >= 0) & (along <= length))
+    return np.asarray(beside & (along >= 0) & (along <= _face_length(pixels, segment)))
 
 
 def _on_ridge(pixels: Raster, segment: Segment) -> NDArray[np.bool_]:
     """Return the pixels through which the ridge of the shear band runs, near the edge."""
-    points = segment.band.ridge.points
-    near = np.hypot(*(points - segment.tool.rake_foot).T) <= _REACH * pixels.spacing
-    x, y = points[near].T
+    x, y = _near_ridge(pixels, segment).T
     row, column = (
         np.floor(values / pixels.spacing).astype(np.intp)
         for values in (pixels.top - y, x - pixels.left)

@@ -60,13 +60,13 @@ _ROLLING: Final = (*_EXPOSURE, "camera.pitch", "camera.offset")
 _HALF: Final = 24
 """Half the side in pixels of the part that is corrected: a correction takes 3 ms a pixel."""
 
+_STEP: Final = 16
+"""Pixels by which this part follows the cursor, so that few moves need a new correction."""
+
 _LINE_OF: Final = {
     "reference": "true", "corrected": "temperature", "low": "lower", "high": "upper",
 }  # fmt: skip
 """Variables of a correction that are drawn along lines, by the names of their curves."""
-
-_STEP: Final = 16
-"""Pixels by which this part follows the cursor, so that few moves need a new correction."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -106,10 +106,9 @@ class Corrected(Brief):
 
     def image(self, name: str) -> Array:
         """Return one of `CORRECTION_IMAGES`, or the corrected temperature, in K."""
-        data = self.data
-        temperature = np.asarray(data["temperature"].values, np.float64)
         if name == "half-width":
-            return np.asarray((data["upper"].values - data["lower"].values) / 2)
+            return self.correction.half_width(self.frame)
+        temperature = np.asarray(self.data["temperature"].values, np.float64)
         if name == "corrected":
             return temperature
         assert self.true is not None
@@ -181,6 +180,9 @@ class SceneModel:
     controls: Controls
     file: str | None  # the scene as a saved study names it; None for the study's cut
     images: ClassVar[tuple[str, ...]] = ("scene", "measured", "error")
+    _caches: dict[str, dict[Hashable, Any]] = field(
+        init=False, default_factory=lambda: defaultdict(dict), repr=False
+    )
 
     @property
     def raster(self) -> Raster:
@@ -189,10 +191,6 @@ class SceneModel:
     @property
     def tool(self) -> Tool | None:
         return self.scene.tool
-
-    _caches: dict[str, dict[Hashable, Any]] = field(
-        init=False, default_factory=lambda: defaultdict(dict), repr=False
-    )
 
     def is_ready(self, state: State) -> bool:
         """Return whether the exact picture needs no quick look, as it takes milliseconds."""
@@ -248,7 +246,7 @@ class SceneModel:
         if state.study.images != CORRECTION:
             return picture
         known = self._caches["correction"].get(self._correction_key(state))
-        return _with_correction(picture, known)
+        return _with_correction(picture, known, self.images)
 
     def corrected(self, picture: Picture, check: Check) -> Picture:
         """Return an exact picture with its corrected image around the cursor."""
@@ -549,14 +547,7 @@ class CorrectionModel:
             state, raster, data, {"measured": _measured_panel(data, raster)},
             _lines(state, raster, data), {}, corrected=corrected,
         )  # fmt: skip
-        shown = _with_correction(picture, corrected)
-        before = shown.panels
-        panels = {
-            "measured": before["scene"],
-            "corrected": before["measured"],
-            "half_width": before["error"],
-        }
-        return replace(shown, panels=panels)
+        return _with_correction(picture, corrected, self.images)
 
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the measured temperature at the cursor in K."""
@@ -589,8 +580,13 @@ def _around_cursor(state: State, pixels: Raster) -> tuple[slice, slice]:
     )
 
 
-def _with_correction(picture: Picture, corrected: Corrected | None) -> Picture:
-    """Return the picture with measured, corrected and one more image; grey where not known."""
+def _with_correction(
+    picture: Picture, corrected: Corrected | None, images: tuple[str, ...]
+) -> Picture:
+    """Return the picture with measured, corrected and one more image, by the names of `images`.
+
+    They are grey where not known.
+    """
     shown, before = picture.state.study.correction_image, picture.panels
     raster = corrected.correction.raster if corrected else picture.raster
     unknown = np.full(raster.shape, nan)
@@ -598,26 +594,25 @@ def _with_correction(picture: Picture, corrected: Corrected | None) -> Picture:
     limits = before["measured"].limits
     if np.isfinite(temperature).any():
         limits = min(limits[0], np.nanmin(temperature)), max(limits[1], np.nanmax(temperature))
-    title, third = (
-        CORRECTION_IMAGES[shown],
-        unknown if corrected is None else corrected.image(shown),
-    )
+    title = CORRECTION_IMAGES[shown]
+    third = corrected.image(shown) if corrected else unknown
     if shown == "true":
         last = Panel(title, "°C", third - ZERO_CELSIUS, raster, limits, HEAT)
     elif shown == "error":
         last = _error_panel(title, third, raster)
     else:
         last = Panel(title, "K", third, raster, (0.0, round_limit(third, 98, 5.0)), PLAIN)
-    panels = {
-        "scene": replace(before["measured"], limits=limits),
-        "measured": Panel("Corrected temperature", "°C", temperature, raster, limits, HEAT),
-        "error": last,
-    }
+    panels = (
+        replace(before["measured"], limits=limits),
+        Panel("Corrected temperature", "°C", temperature, raster, limits, HEAT),
+        last,
+    )
     lines = {
         name: curves | _corrected_line(picture, corrected, name)
         for name, curves in picture.lines.items()
     }
-    return replace(picture, panels=panels, lines=lines, corrected=corrected)
+    by_name = dict(zip(images, panels, strict=True))
+    return replace(picture, panels=by_name, lines=lines, corrected=corrected)
 
 
 def _corrected_line(picture: Picture, corrected: Corrected | None, name: str) -> dict[str, Array]:

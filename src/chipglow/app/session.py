@@ -16,7 +16,7 @@ PHASES: Final = 3
 """Pixel phases along each axis of the app's draws."""
 
 TEXTURES: Final = 5
-"""Draws of "Draw phases and textures": nine positions of the pixels and five textures."""
+"""Textures of the app's draws."""
 
 _PAINT_TIMEOUT: Final = 0.5
 """Seconds to wait for the page to paint a picture before the next one is sent."""

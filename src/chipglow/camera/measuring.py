@@ -24,13 +24,7 @@ from chipglow.scene import Raster
 def form_measurement(
     camera: CameraDescription, exposures: Exposure | Iterable[Exposure]
 ) -> Measurement:
-    """Form one frame from each exposure.
-
-    Blur, integration over the pixel and mean over time commute: it equals the loop of Figure 6.
-    Beyond the scene, radiance continues as at the edge. The attribute ``warnings`` states where
-    pixels change by more than `BORDER_TOLERANCE` if the surroundings instead resemble what each
-    pixel sees within the scene.
-    """
+    """Form one frame from each exposure; see `Camera.form_measurement`."""
     images: list[Array] = []
     similar, starts, effects, grids = [], [], [], set()
     warnings: dict[str, None] = {}

@@ -260,7 +260,6 @@ def _doubts(result: "Correction") -> "Notes":
 
 
 def _print(result: "Correction", frame: "pd.DataFrame") -> None:
-
     from chipglow.quantities import ZERO_CELSIUS
 
     screen = current()

@@ -80,7 +80,6 @@ def _convert_many(sources: list[Path], out: Path | None, settings: list[str], fo
     notes = {}
 
     def converted(source: Path) -> dict[str, object]:
-
         if is_measurement(source):
             raise ValueError(f"{source}: already a measurement; expected a camera file")
         measurement = load_measurement(source, settings)

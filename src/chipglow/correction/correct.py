@@ -404,21 +404,20 @@ def _on_pixels(
     )
     variables["outline_motion"] = "motion", motion, {"units": "m, m, rad"}
     variables["outline_uncertainty"] = "motion", spread, {"units": "m, m, rad"}
-    own = slice(CELLS_PER_PIXEL * _MARGIN, -CELLS_PER_PIXEL * _MARGIN)
     coordinates = {
         "source": ("error", np.array(sources, dtype=str)),
         "degrees_of_freedom": ("error", np.array(freedoms)),
         "motion": ["right", "up", "turn"],
-        "fine_x": ("fine_x", parts.cells.x[own], {"units": "m"}),
-        "fine_y": ("fine_y", parts.cells.y[own], {"units": "m"}),
+        "fine_x": ("fine_x", _inside(parts.cells.x, CELLS_PER_PIXEL), {"units": "m"}),
+        "fine_y": ("fine_y", _inside(parts.cells.y, CELLS_PER_PIXEL), {"units": "m"}),
     }
     return xr.Dataset(variables, coordinates)
 
 
-def _inside(image: NDArray[Any], parts: int = 1) -> NDArray[Any]:
-    """Return the measured part of an extended image with `parts` values along a pixel."""
+def _inside(extended: NDArray[Any], parts: int = 1) -> NDArray[Any]:
+    """Return the measured part of an extended image or axis with `parts` values along a pixel."""
     edge = slice(parts * _MARGIN, -parts * _MARGIN)
-    return image[edge, edge]
+    return extended[(edge,) * extended.ndim]
 
 
 def _zone_of_pixels(

@@ -83,7 +83,7 @@ class Correction:
         rows = []
         for frame, time in enumerate(self.data["time"].values.tolist()):
             flags, data = self.flags[frame], self.data.isel(time=frame)
-            half = (data["upper"].values - data["lower"].values) / 2
+            half = self.half_width(frame)
             celsius = data["temperature"].values - ZERO_CELSIUS
             is_known = np.isfinite(celsius).any()
             rows.append(
@@ -104,6 +104,11 @@ class Correction:
     def flags(self) -> NDArray[np.uint8]:
         """Sums of `CorrectionFlag`, shape (time, y, x)."""
         return np.asarray(self.data["flags"].values, np.uint8)
+
+    def half_width(self, frame: int = 0) -> Array:
+        """Return half the width of the 95 % interval of each pixel in K, shape (y, x)."""
+        data = self.data.isel(time=frame)
+        return np.asarray((data["upper"].values - data["lower"].values) / 2)
 
     @property
     def raster(self) -> Raster:

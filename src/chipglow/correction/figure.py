@@ -22,11 +22,8 @@ def draw_correction(correction: Correction, measurement: Measurement, frame: int
     """Draw one frame as measured and as corrected on one scale, and the interval's half-width."""
     raster = correction.raster
     measured = measurement.celsius(frame)
-    data = correction.data.isel(time=frame)
-    corrected = data["temperature"].values - ZERO_CELSIUS
-    half_width = np.where(
-        np.isfinite(corrected), (data["upper"].values - data["lower"].values) / 2, np.nan
-    )
+    corrected = correction.data["temperature"][frame].values - ZERO_CELSIUS
+    half_width = np.where(np.isfinite(corrected), correction.half_width(frame), np.nan)
     heat = scales.ends(np.concatenate([measured, corrected]), 0.5, 99.5)
     widths = (0.0, float(np.nanpercentile(half_width, _LARGEST_PERCENTILE)))
     panels = (

@@ -34,7 +34,7 @@ _DRAW_TOLERANCE: Final = 1e-2
 """Relative residual of a draw, far below the scatter of a standard deviation from a few draws."""
 
 _CHANGE_TOLERANCE: Final = 1e-3
-"""Relative residuals of steps, which are repeated, of draws, and of changes by single errors."""
+"""Relative residual of a change by a single error, which is computed once."""
 
 _MOST_ITERATIONS: Final = 200
 """Most iterations of conjugate gradients."""

@@ -243,10 +243,10 @@ def is_number(value: object) -> TypeGuard[float]:
 
 
 COLDEST: Final = 200.0
-"""Lowest temperature in K of fields, and of the tables of radiance."""
+"""Lowest temperature in K of scenes, black bodies and radiance tables."""
 
 HOTTEST: Final = 6000.0
-"""Limits in K of the temperatures of scenes, black bodies and radiance tables."""
+"""Their highest temperature in K."""
 
 POSITION: Final = Quantity("a position", "m", "um", "-420 um", positive=False)
 Position = Annotated[float, POSITION]

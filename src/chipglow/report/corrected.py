@@ -81,7 +81,7 @@ def _panels(window: CorrectedWindow) -> Iterator[ImagePanel]:
     corrected = data["temperature"].values - ZERO_CELSIUS
     measured = window.measurement.celsius(0)
     true = np.where(np.isnan(corrected), np.nan, window.true - ZERO_CELSIUS)
-    half = (data["upper"].values - data["lower"].values) / 2
+    half = window.correction.half_width()
     heat = scales.ends(np.concatenate([measured, corrected, true]), 0.5, 99.5)
     known = half[np.isfinite(half)]
     widths = 0.0, float(np.percentile(known, _LARGEST)) if known.size else 1.0

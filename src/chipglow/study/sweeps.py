@@ -385,10 +385,9 @@ def studies_at(study: Study, points: Sequence[Mapping[str, Any]]) -> list[Study 
             studies.append(changed(study, point))
         except (ValueError, LookupError) as error:
             studies.append(Impossible(f"{point_text(point)}: {error}"))
-    if isinstance(first := studies[0], Impossible) and not any(
-        isinstance(one, Study) for one in studies
-    ):
-        raise ValueError(first.reason)
+    reasons = [one.reason for one in studies if isinstance(one, Impossible)]
+    if len(reasons) == len(studies):
+        raise ValueError(reasons[0])
     return studies
 
 

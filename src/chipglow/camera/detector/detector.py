@@ -24,10 +24,10 @@ Correction: TypeAlias = Literal["two-point", "one-point", "none"]
 """Non-uniformity correction: by frames of two flat-field sources, of one, or none."""
 
 DARKER_SOURCE: Final = 0.1
-"""Fraction of the saturation of the darker of two flat-field sources."""
+"""Fraction of the capacity that the darker source of the correction fills, if none is named."""
 
 BRIGHTER_SOURCE: Final = 0.8
-"""Parts of the capacity that the sources of the correction fill, if none are named."""
+"""Fraction that the brighter source fills, likewise."""
 
 
 @dataclass(frozen=True, kw_only=True)
