@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera.camera import Camera
 from chipglow.camera.effect import EVERY, Effect
-from chipglow.camera.exposure import Exposure, SpectralView, expose
+from chipglow.camera.exposure import Exposure, SpectralView
 from chipglow.camera.exposure_kernels import Check
 from chipglow.camera.image import form_image, image_formation
 from chipglow.camera.measurement import range_flags
@@ -124,7 +124,7 @@ class Chain:
         ValueError
             If the scene does not cover the integration time or the pixels.
         """
-        (exposure,) = self.camera.expose_fields(self.scene, (self.emissivity,), start, check)
+        (exposure,) = expose_chains([self], start, check)
         return self.exposed(replace(exposure, effects=self.surface.effects), reference)
 
     def exposed(
@@ -138,6 +138,11 @@ class Chain:
         apart = lru_cache(1)(partial(_exposures, self, exposure))
         stages = Stages(exposure, apart, shares_blur)
         return ExposedChain(self.camera, stages, reference, self.reflects)
+
+    @property
+    def view(self) -> SpectralView:
+        """The surface on the scene in the camera's band and surroundings."""
+        return SpectralView(self.emissivity, self.camera.band, self.camera.reflected)
 
     @property
     def reflects(self) -> bool:
@@ -315,10 +320,8 @@ def expose_chains(
     chains: Sequence[Chain], start: float, check: Check | None = None
 ) -> tuple[Exposure, ...]:
     """Expose chains of a scene in one pass; their cameras may differ in the band alone."""
-    camera = chains[0].camera
-    delays = camera.row_delays(chains[0].scene.raster)
-    views = [SpectralView(one.emissivity, one.camera.band, one.camera.reflected) for one in chains]
-    return expose(chains[0].scene, views, start, camera.integration_time, delays, check)
+    first = chains[0]
+    return first.camera.expose_views(first.scene, [one.view for one in chains], start, check)
 
 
 def chains_in_bands(surface: Surface, scene: Scene, cameras: Sequence[Camera]) -> tuple[Chain, ...]:
@@ -340,7 +343,7 @@ def expose_apart(
     chain: Chain, start: float, reference: ReferenceKind = "maximum", check: Check | None = None
 ) -> ExposedChain:
     """Expose once, with the effects of the surface switched off too, in one pass."""
-    exposures = _in_one_pass(chain, _views(chain), start, check)
+    exposures = chain.camera.expose_views(chain.scene, _views(chain), start, check)
     stages = Stages(exposures[0], lambda: Exposures(*exposures))
     return ExposedChain(chain.camera, stages, reference, chain.reflects)
 
@@ -394,7 +397,8 @@ def _read(formed: Callable[..., Array], start: float, camera: Camera, *how: obje
 
 
 def _exposures(chain: Chain, seen: Exposure) -> Exposures:
-    return Exposures(seen, *_in_one_pass(chain, _views(chain)[1:], seen.start))
+    others = chain.camera.expose_views(chain.scene, _views(chain)[1:], seen.start)
+    return Exposures(seen, *others)
 
 
 def _views(chain: Chain) -> list[SpectralView]:
@@ -402,18 +406,10 @@ def _views(chain: Chain) -> list[SpectralView]:
     scene, band = chain.scene, chain.camera.band
     plain = _unreflecting(chain.surface)
     return [
-        SpectralView(chain.emissivity, band, chain.camera.reflected),
+        chain.view,
         SpectralView(plain.prepare(scene, band), band),
         SpectralView(UniformSurface(1.0).prepare(scene, band), band),
     ]
-
-
-def _in_one_pass(
-    chain: Chain, views: Sequence[SpectralView], start: float, check: Check | None = None
-) -> tuple[Exposure, ...]:
-    camera, scene = chain.camera, chain.scene
-    delays = camera.row_delays(scene.raster)
-    return expose(scene, views, start, camera.integration_time, delays, check)
 
 
 def _unreflecting(surface: Surface) -> Surface:
