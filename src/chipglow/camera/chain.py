@@ -30,7 +30,7 @@ from chipglow.camera.reference import (
     true_kind,
 )
 from chipglow.quantities import Array
-from chipglow.scene import Scene
+from chipglow.scene import Raster, Scene, sample
 from chipglow.surface import EmissivityField, ModifiedSurface, Surface, UniformSurface
 
 _IMAGES_KEPT: Final = 128
@@ -61,6 +61,19 @@ class Exposures(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
+class LightBeyond:
+    """Light that reaches the pixels from beyond a part of a scene: it is blurred into the part."""
+
+    image: Array
+    """Radiance in W/(m² sr) on some pixels, (y, x); negative where the edge continues too bright"""
+    pixels: Raster
+
+    def on(self, pixels: Raster) -> Array:
+        """Return the radiance on other pixels, linear between these; 0 beyond them."""
+        return np.nan_to_num(sample(self.image, self.pixels, pixels.centres))
+
+
+@dataclass(frozen=True, eq=False)
 class Chain:
     """A camera in front of a scene: from the true temperatures to the reading of every pixel.
 
@@ -74,6 +87,8 @@ class Chain:
         The emissivity.
     field : EmissivityField, optional
         The surface on the scene, from `Camera.prepare`, if it is known.
+    beyond : LightBeyond, optional
+        Light from beyond a scene that is part of another, with all effects.
 
     Examples
     --------
@@ -86,6 +101,7 @@ class Chain:
     scene: Scene
     surface: Surface
     field: EmissivityField | None = None
+    beyond: LightBeyond | None = None
 
     @cached_property
     def emissivity(self) -> EmissivityField:
@@ -136,7 +152,7 @@ class Chain:
         pixels have in common.
         """
         apart = lru_cache(1)(partial(_exposures, self, exposure))
-        stages = Stages(exposure, apart, shares_blur)
+        stages = Stages(exposure, apart, shares_blur, self.beyond)
         return ExposedChain(self.camera, stages, reference, self.reflects)
 
     @property
@@ -158,6 +174,7 @@ class Stages:
         exposure: Exposure,
         apart: Callable[[], Exposures] | None = None,
         shares_blur: bool = False,
+        beyond: LightBeyond | None = None,
     ) -> None:
         if not isinstance(exposure, Exposure):
             raise ValueError(
@@ -168,7 +185,7 @@ class Stages:
         sources = partial(_source, exposure, apart)
         blurred = partial(blur, exposure.mean_radiance, spacing=exposure.raster.spacing)
         kept = lru_cache(1)(blurred) if shares_blur else None
-        self.radiance = lru_cache(_IMAGES_KEPT)(partial(_formed, sources, kept))
+        self.radiance = lru_cache(_IMAGES_KEPT)(partial(_formed, sources, kept, beyond))
         self.read = lru_cache(_READINGS_KEPT)(partial(_read, self.radiance, exposure.start))
         self.reference = lru_cache(_READINGS_KEPT)(
             partial(reference_temperature, exposure=exposure)
@@ -195,6 +212,11 @@ class ExposedChain:
     def exposure(self) -> Exposure:
         """The exposure with all effects."""
         return self.stages.exposure
+
+    @property
+    def pixels(self) -> Raster:
+        """The pixels on the scene."""
+        return self.camera.pixels(self.exposure.raster)
 
     def through(self, camera: Camera) -> "ExposedChain":
         """Return the chain with another camera of the same band and integration time."""
@@ -374,6 +396,7 @@ def _source(exposure: Exposure, apart: Callable[[], Exposures] | None, name: str
 def _formed(
     source: Callable[[str], Exposure],
     blurred: Callable[[PointSpreadFunction], Array] | None,
+    beyond: LightBeyond | None,
     camera: Camera,
     name: str,
     moves: bool,
@@ -388,7 +411,10 @@ def _formed(
     if is_common and psf and camera.psf_order == "optics" and "footprint" not in psf.includes:
         assert blurred is not None
         radiance, camera = blurred(psf), replace(camera, psf=None)
-    return form_image(camera, radiance, exposure.raster, gather)
+    image = form_image(camera, radiance, exposure.raster, gather)
+    if beyond is None:
+        return image
+    return np.maximum(image + beyond.on(camera.pixels(exposure.raster)), 0.0)
 
 
 def _read(formed: Callable[..., Array], start: float, camera: Camera, *how: object) -> PixelReading:
