@@ -10,8 +10,14 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from chipglow.analysis.attribution import attribute, read_attribution
-from chipglow.analysis.corrected import RAKE_FACE, SHEAR_BAND, CorrectedWindow, corrected_windows
+from chipglow.analysis.attribution import AttributionPlan, attribute, read_attribution
+from chipglow.analysis.corrected import (
+    RAKE_FACE,
+    SHEAR_BAND,
+    CorrectedWindow,
+    CorrectionPlan,
+    corrected_windows,
+)
 from chipglow.analysis.cut import Cut, Progress, cutting_forces, find_cut, lacking, spread_starts
 from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.heated import heated_objects
@@ -218,6 +224,8 @@ class _Task:
     plan: Plan
     tell: Progress
     effects: Mapping[str, Collection[str]]
+    attribution: AttributionPlan | None = None
+    correction: CorrectionPlan | None = None
     failed: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -240,6 +248,8 @@ def analyse(
     plan: Plan,
     progress: Progress | None = None,
     effects: Mapping[str, Collection[str]] = CASES,
+    attribution: AttributionPlan | None = None,
+    correction: CorrectionPlan | None = None,
 ) -> Analysis:
     """Measure a scene with a virtual camera, and read the errors.
 
@@ -258,6 +268,11 @@ def analyse(
     effects : mapping
         The axis ``effects`` of the result: by name the effects that are on, members of `Effect`.
         ``all`` comes first and has all of them; ``without psf`` is required.
+    attribution : AttributionPlan, optional
+        Effects among which the errors of the shown exposure are divided; None: they are not.
+    correction : CorrectionPlan, optional
+        What is known if the shown exposure of a cut is corrected beside the cutting edge; None: it
+        is not corrected.
 
     Returns
     -------
@@ -273,7 +288,7 @@ def analyse(
         place is outside the pixels, or a surface cannot be applied to the scene.
     """
     tell = progress or (lambda label, part: None)
-    task = _Task(scene, surfaces, camera, plan, tell, effects)
+    task = _Task(scene, surfaces, camera, plan, tell, effects, attribution, correction)
     fields = {name: camera.prepare(surface, scene) for name, surface in surfaces.items()}
     schedule, cut, missing = _schedule(task)
     readings = read(scene, surfaces, fields, camera, schedule, lambda part: tell("camera", part))
@@ -464,7 +479,7 @@ def _corrected_beside_edge(
     task: _Task, cut: Cut, frames: Mapping[str, Measurement]
 ) -> tuple[CorrectedWindow, ...]:
     """Return the corrected parts of the shown exposure; none without a plan or a blur."""
-    plan = task.plan.correction
+    plan = task.correction
     if plan is None or task.camera.psf is None:
         return ()
     task.tell("correction", 0.0)
@@ -570,7 +585,7 @@ def _outside(
 
 def _attribution(task: _Task, schedule: Schedule, data: xr.Dataset) -> Variables:
     """Return the contributions of the effects in the shown exposure, and at the readings."""
-    plan, shown = task.plan.attribution, schedule.shown
+    plan, shown = task.attribution, schedule.shown
     if plan is None:
         return {}
     every = []
@@ -634,6 +649,7 @@ def _attributes(task: _Task, schedule: Schedule, cut: Cut | None) -> dict[str, A
     attributes: dict[str, Any] = {
         "shown_instant": schedule.shown,
         "error_reference": plan.reference,
+        **({"attribution_reference": task.attribution.reference} if task.attribution else {}),
         **(tool_attributes(tool) if tool else {}),
     }
     if cut is not None:
