@@ -33,11 +33,6 @@ class Camera(CameraDescription):
     ------
     ValueError
         If a value is out of its limits; the message names field, value and limits.
-
-    Warns
-    -----
-    ChipglowWarning
-        If the lower range limit is probably in °C instead of K.
     """
 
     @classmethod
