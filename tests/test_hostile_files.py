@@ -11,7 +11,7 @@ from command import refused
 from test_io import a_file
 
 from chipglow.io import open_scene, read_measurement
-from chipglow.text import MemoryLimitError, check_bounds, check_memory
+from chipglow.text import MemoryLimitError, check_bounds, check_memory, parse_yaml
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX")
 
@@ -154,3 +154,44 @@ def test_a_lack_of_memory_or_threads_is_one_line_with_a_hint(tmp_path, monkeypat
 
     monkeypatch.setattr("chipglow.study.study_text", fails)
     refused(["init", tmp_path / "study.yaml"], text, code=1)
+
+
+DOUBLED = "a0: &a0 [x, x]\n" + "".join(
+    f"a{level}: &a{level} [*a{level - 1}, *a{level - 1}]\n" for level in range(1, 40)
+)
+MERGED = "a0: &a0 {x: 1}\n" + "".join(
+    f"a{level}: &a{level} {{<<: [*a{level - 1}, *a{level - 1}]}}\n" for level in range(1, 40)
+)
+HOSTILE_YAML = {
+    "doubled": (DOUBLED, "has over 10000 keys and values"),
+    "merged": (MERGED, "has over 10000 keys and values"),
+    "itself": ("camera: &a {pitch: *a}", "line 1, column 20: contains itself"),
+    "merged with itself": ("camera: &a {<<: *a}", "contains itself"),
+    "deep": ("[" * 100_000, "has over 50 levels of sections"),
+    "keys": ("\n".join(f"k{number}: 1" for number in range(80_000)), "has over 10000 keys"),
+    "points": (f"analysis: {{points: [{'1, ' * 100_000}]}}", "has over 10000 keys"),
+    "digits": (f"seed: {'9' * 400}", "line 1, column 7: the number is too large"),
+    "tag": ('seed: !!int ""', "a value does not fit its tag"),
+    "half a character": ('title: "\\uD800"', "has half a character"),
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE_YAML)
+def test_hostile_yaml_is_one_line(kind, tmp_path):
+    text, message = HOSTILE_YAML[kind]
+    path = tmp_path / "study.yaml"
+    path.write_text(text, encoding="utf-8")
+    refused(["run", path, "--out", tmp_path / "out"], "study.yaml", message)
+
+
+def test_an_error_quotes_no_pages_of_the_input(tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text(f"seed: [{'1, ' * 9000}]", encoding="utf-8")
+    output = refused(["run", path, "--out", tmp_path / "out"], "seed: [1, 1", "a whole number")
+    assert len(output) < 3000  # the longest message is of 2000 characters
+
+
+def test_aliases_that_expand_to_little_are_read():
+    parsed = parse_yaml("a: &a {x: 1, z: 3}\nb: &b {<<: *a, y: 2}\nc: {<<: [*b, *a], x: 4}\n")
+    assert parsed["c"] == {"x": 4, "y": 2, "z": 3}
+    assert parsed["b"] == {"x": 1, "y": 2, "z": 3}

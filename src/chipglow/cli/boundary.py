@@ -19,6 +19,9 @@ FAILED: Final = 1
 INTERRUPTED: Final = 130
 """Exit status after Ctrl-C, as of shells: 128 and the number of the signal."""
 
+_LONGEST_MESSAGE: Final = 2000
+"""Characters of an error that are shown; a longer one quotes a value of the input."""
+
 _NO_THREAD: Final = "can't start new thread"
 _FEWER: Final = "end other programs, raise the limit (ulimit -u), or set OMP_NUM_THREADS=1"
 _SMALLER: Final = "choose fewer or coarser samples, or end other programs"
@@ -90,7 +93,8 @@ def _one_line(error: Exception) -> str:
     text = str(error)
     if isinstance(error, OSError) and error.strerror:
         text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    return " ".join(text.split())
+    line, half = " ".join(text.split()), _LONGEST_MESSAGE // 2
+    return line if len(line) <= _LONGEST_MESSAGE else f"{line[:half]} … {line[-half:]}"
 
 
 def _complete(group: TyperGroup, option: Any) -> None:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, get_args
 import numpy as np
 import pandas as pd
 import xarray as xr
-import yaml
 from scipy.stats import qmc
 
 from chipglow.analysis import Analysis, headlines
@@ -24,7 +23,7 @@ from chipglow.quantities import Quantity, adapter, changed, setting_at
 from chipglow.study.running import Progress, cut, is_cut, run, scene_inputs
 from chipglow.study.schema import Study
 from chipglow.study.workers import Client, local_client, on_client
-from chipglow.text import Notes, result_html
+from chipglow.text import Notes, parse_yaml, result_html
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,7 +78,7 @@ class Sweep:
         file = Path(folder) / DESCRIPTION
         try:
             return cls._stated(Path(folder), file.read_text(encoding="utf-8"))
-        except (ValueError, LookupError, TypeError):
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
             raise ValueError(f"{file}: is damaged; run the sweep again") from None
 
     @classmethod
@@ -290,7 +289,7 @@ def axis(values: str | Sequence[Any]) -> list[Any]:
     if not isinstance(values, str):
         return list(values)
     if (ends := _RANGE.fullmatch(values)) is None:
-        return [yaml.safe_load(one) for one in values.split(",")]
+        return [parse_yaml(one) for one in values.split(",")]
     first, last, count = ends.groups()
     return [between(first, last, part) for part in np.linspace(0.0, 1.0, int(count or 2))]
 
@@ -453,7 +452,7 @@ def _record(path: Path) -> Mapping[str, Any] | None:
     """Return the content of a point's file; None if it is missing or damaged."""
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
-    except (FileNotFoundError, ValueError):
+    except (FileNotFoundError, ValueError, RecursionError):
         return None
     if not isinstance(record, dict):
         return None
