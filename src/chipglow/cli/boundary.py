@@ -23,6 +23,9 @@ _LONGEST_MESSAGE: Final = 2000
 """Characters of an error that are shown; a longer one quotes a value of the input."""
 
 _NO_THREAD: Final = "can't start new thread"
+_NO_ROOM: Final = "failed to map segment"
+"""What the system says of a library for which a limit of memory leaves no room."""
+
 _FEWER: Final = "end other programs, raise the limit (ulimit -u), or set OMP_NUM_THREADS=1"
 _SMALLER: Final = "choose fewer or coarser samples, or end other programs"
 
@@ -62,6 +65,10 @@ class Boundary(TyperGroup):
             raise _ended(f"{error.param.opts[0]}: {message}", BAD_INPUT) from None
         except (ValueError, OSError) as error:
             raise _ended(_one_line(error), BAD_INPUT) from None
+        except OverflowError as error:
+            raise _ended(f"a number is too large: {_one_line(error)}", BAD_INPUT) from None
+        except RecursionError:
+            raise _ended("the input is nested too deeply", BAD_INPUT) from None
         except KeyboardInterrupt as error:
             kept = (
                 f"{error}: --resume continues from there" if str(error) else "nothing was written"
@@ -72,6 +79,10 @@ class Boundary(TyperGroup):
                 ": ".join(filter(None, ("not enough memory", _one_line(error)))) + f"; {_SMALLER}",
                 FAILED,
             ) from None
+        except ImportError as error:
+            if _NO_ROOM not in str(error):
+                raise
+            raise _ended(f"not enough memory to load a library; {_SMALLER}", FAILED) from None
         except RuntimeError as error:
             from chipglow.cutting import SolverError
 

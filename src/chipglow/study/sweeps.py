@@ -8,6 +8,7 @@ from functools import cache, cached_property
 from hashlib import sha256
 from importlib.metadata import version
 from itertools import product
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, get_args
 
@@ -40,8 +41,11 @@ NUMBERS: Final = ("reference", "error", "uncertainty", "psf_portion", "true_erro
 FRACTIONS: Final = ("below_range", "saturated")
 """Stored fractions of each reading's place below the lower range limit, and saturated."""
 
+MOST_POINTS: Final = 100_000
+"""Points of a sweep: each is a file in one folder, and a study in memory."""
+
 _POINTS: Final = "points"
-_RANGE: Final = re.compile(r"([^:]+):([^:]+)(?::(\d+))?")
+_RANGE: Final = re.compile(r"([^:]+):([^:]+)(?::(\d{1,18}))?")
 _QUANTITY: Final = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
 
@@ -291,7 +295,10 @@ def axis(values: str | Sequence[Any]) -> list[Any]:
     if (ends := _RANGE.fullmatch(values)) is None:
         return [parse_yaml(one) for one in values.split(",")]
     first, last, count = ends.groups()
-    return [between(first, last, part) for part in np.linspace(0.0, 1.0, int(count or 2))]
+    number = int(count or 2)
+    if number > MOST_POINTS:
+        raise ValueError(f"{values}: makes {number} values, expected up to {MOST_POINTS}")
+    return [between(first, last, part) for part in np.linspace(0.0, 1.0, number)]
 
 
 def between(first: object, last: object, part: float) -> str | float:
@@ -363,6 +370,9 @@ def points_of(
     """Yield the settings of each point as a study takes them."""
     if not axes:
         raise ValueError("vary: name at least one setting")
+    count = prod(map(len, axes.values())) if method == "grid" else samples
+    if not 1 <= count <= MOST_POINTS:
+        raise ValueError(f"vary: makes {count} points, expected 1 to {MOST_POINTS}")
     if method == "grid":
         for values in product(*axes.values()):
             yield dict(zip(axes, values, strict=True))

@@ -79,11 +79,12 @@ class _Loader(yaml.SafeLoader):
         self._nodes = 0
         self._open: list[int] = []
         """Levels below each node that is not complete."""
-        self._sizes: dict[yaml.Node, tuple[int, int]] = {}
+        self._sizes: dict[Any, tuple[int, int]] = {}
         """Nodes of each complete node, itself included, and levels below it."""
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        mark, before = self.peek_event().start_mark, self._nodes
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        mark, before = event.start_mark, self._nodes
         if len(self._open) > _MOST_LEVELS:
             raise _refused(f"has over {_MOST_LEVELS} levels of sections", mark)
         if self.check_event(yaml.AliasEvent):
