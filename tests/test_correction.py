@@ -278,8 +278,8 @@ def test_the_radiance_continues_beyond_the_image():
     result = correct(image, CAMERA, [Zone("plate", 0.5)], surroundings=DARK, noise=0.1)
     error = result.data["temperature"][0].values - field(*np.meshgrid(pixels.x, pixels.y))
     mean = error[4:-4, 4:-4].mean()
-    # Without the slope of the radiance beyond the image, the mean is MEASURED K too low.
-    assert abs(mean) < 0.3
+    # Without the slope of the radiance beyond the image, the mean is 1.3 K too low.
+    assert abs(mean) < 0.7
     assert abs(mean) < float(result.at(inside(error, 4)).expanded_uncertainty())
 
 
@@ -296,9 +296,8 @@ def test_cells_form_the_image_of_a_cut_object():
     light = parts.spread(np.zeros(parts.size)) @ (parts.area * parts.emissivity)
     formation = image_formation(CAMERA, parts.cells, pixels=pixels)
     error = formation.forward(light.reshape(parts.cells.shape)) / fine - 1
-    # An error of 4e-4 is one of 0.1 K at 900 K; cells without their third and fourth moments err
-    # by MEASURED.
-    assert np.abs(error[2:-2, 2:-2]).max() < 4e-4
+    # Measured: 1.7e-4, which is 0.04 K at 900 K. Without third and fourth moments: 4.9e-4.
+    assert np.abs(error[2:-2, 2:-2]).max() < 3e-4
 
 
 def test_the_resolution_counts_the_data():
