@@ -188,6 +188,11 @@ class Parts:
         cell = (row + down) * others.cells.columns + column + right
         return replace(self, cells=others.cells, pixels=others.pixels, cell=cell)
 
+    def chosen(self, parts: NDArray[np.intp]) -> "Parts":
+        """Return some of the parts."""
+        names = [field.name for field in fields(self) if field.name not in ("cells", "pixels")]
+        return replace(self, **{name: getattr(self, name)[parts] for name in names})
+
     @cached_property
     def pixel(self) -> NDArray[np.intp]:
         """Index of each part's pixel, in rows from the top."""

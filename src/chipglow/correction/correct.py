@@ -216,7 +216,7 @@ def _corrected(
     if known.outline_uncertainty:
         known, fit, former = _located(image, camera, known, pixels, lambda: progress(0.0))
     problem = _problem(image, camera, known, pixels)
-    problem.beyond = Beyond.of(known.observed, problem.parts, problem.formation)
+    problem.beyond = Beyond.of(known.observed, problem.parts, problem.formation, measurement.raster)
     posterior = problem.solve(generator, lambda: progress(0.0), former)
     progress(0.5)
     bias = posterior.bias()
