@@ -23,8 +23,7 @@ _FADING: Final = 16.0
 """Pixels over which a slope at the border fades to 1/e.
 
 In 20 scenes for tuning of ``benchmarks/correction.py``, images were then 0.07 K too dark on
-average,
-with a standard deviation of 0.2 K; without slopes beyond the margin 0.5 K too bright.
+average, with a standard deviation of 0.2 K; without slopes beyond the margin 0.5 K too bright.
 """
 
 _DOUBT: Final = 0.7
@@ -45,12 +44,14 @@ _RIDGE: Final = 1e-6
 class Beyond:
     """The parts of an image and those around it."""
 
+    solved: Parts
+    """Parts of the image and its margin, on the cells of `outer`."""
     inner: Parts
-    """Parts of the image, on the cells of `outer`."""
+    """Those of the image."""
     chosen: NDArray[np.intp]
     """Index of each inner part among those that are solved for.
 
-    Those in the margin are not used: the image hardly determines them.
+    The image hardly determines those in the margin: they are not continued.
     """
     outer: Parts
     formation: ImageFormation
@@ -68,8 +69,9 @@ class Beyond:
         rows, columns = (CELLS_PER_PIXEL * count for count in image.shape)
         within = (below >= 0) & (below < rows) & (beside >= 0) & (beside < columns)
         chosen = np.flatnonzero(within)
-        inner = parts.within(outer).chosen(chosen)
-        return cls(inner, chosen, outer, replace(formation, samples=outer.cells))
+        solved = parts.within(outer)
+        inner = solved.chosen(chosen)
+        return cls(solved, inner, chosen, outer, replace(formation, samples=outer.cells))
 
     def excess(self, x: Array, light: Array) -> Array:
         """Return the image of the light that the continuation adds to constant edges, (y, x).
@@ -79,6 +81,16 @@ class Beyond:
         reach = CELLS_PER_PIXEL * _REACH
         constant = np.pad(light, reach, mode="edge")
         return self._seen(self._light(self._continued(x)) - constant, self._outside)
+
+    def started(self, x: Array) -> Array:
+        """Return a solution whose values in the margin are those of the continuation."""
+        index = self.outer.index[self.solved.zone, self.solved.cell // self.outer.cells.columns,
+                                 self.solved.cell % self.outer.cells.columns]  # fmt: skip
+        margin = index >= 0
+        margin[self.chosen] = False
+        values = x.copy()
+        values[margin] = self._continued(x)[index[margin]]
+        return values
 
     def errors(self, x: Array) -> list[Array]:
         """Return the changes of the image by one standard uncertainty of each side's light."""

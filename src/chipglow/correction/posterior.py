@@ -156,14 +156,16 @@ class Problem:
             squares = (self.curvature.matrix @ posterior.x) ** 2 + uncertain
             measured = ~self.image.missing.ravel()[self.parts.pixel]
             self._weigh(self.curvature.variances(squares, self.parts, measured))
-            self._continue(posterior)
-            posterior = self._maximum(posterior.x, check)
+            posterior = self._maximum(self._continued(posterior), check)
         return posterior
 
-    def _continue(self, posterior: "Posterior") -> None:
-        """Set the light from beyond the edges to that of a solution which continues."""
-        if self.beyond is not None:
-            self.excess = self.beyond.excess(posterior.x, posterior.light)
+    def _continued(self, posterior: "Posterior") -> Array:
+        """Continue a solution beyond the image, and return it as a start."""
+        if self.beyond is None:
+            return posterior.x
+        x = self.beyond.started(posterior.x)
+        self.excess = self.beyond.excess(x, Posterior(self, x).light)
+        return x
 
     def _start(self) -> Array:
         """Return the solution without blur: each cell has the radiance of its pixel."""
