@@ -328,7 +328,7 @@ def schedule_of(
 
 
 def _schedule(task: _Task) -> tuple[Schedule, Cut | None, tuple[str, ...]]:
-    """Return the schedule with the cut, if the scene shows one, or with what it lacks."""
+    """Return the schedule, the cut if the scene shows one, and the missing parts if not."""
     cut, missing = _find_cut(task)
     return _scene_schedule(task) if cut is None else _cut_schedule(task, cut), cut, missing
 

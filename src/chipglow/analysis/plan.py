@@ -28,8 +28,8 @@ class Plan(Part):
     attribution : AttributionPlan, optional
         Effects among which the errors of the shown exposure are divided; None: they are not.
     correction: CorrectionPlan, optional
-        What is known if the shown exposure of a cut is corrected beside the cutting edge; None: it
-        is not corrected.
+        Knowledge for correcting the shown exposure of a cut near the cutting edge; None: it is not
+        corrected.
 
     Raises
     ------

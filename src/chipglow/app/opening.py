@@ -48,7 +48,7 @@ _Points: TypeAlias = Iterable[Any]
 def scene_model(
     scene: Scene, study: Study, name: str, file: str | None, shown: Mapping[str, Any] | None = None
 ) -> SceneModel:
-    """Open a scene at its developed shear band, else in its middle; a ValueError if too short.
+    """Open a scene at its developed shear band, else at its central frame; ValueError if too short.
 
     A study that the app saved contains cursor and lines; `shown` are its exposure and images.
     """

@@ -114,7 +114,7 @@ class PageView:
 
     @property
     def _handlers(self) -> Mapping[str, Callable[[Any], None]]:
-        """What answers a message of the page, by its kind; other kinds are a KeyError."""
+        """Functions that answer messages of the page, by kind; KeyError for other kinds."""
         return {
             "ready": self._on_ready,
             "change": self._on_change,

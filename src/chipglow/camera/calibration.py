@@ -80,7 +80,7 @@ class CalibrationErrors(Brief):
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrationSettings(MeasuringRange):
-    """What is stated of a calibration beside its numbers."""
+    """Measuring range, warnings and other statements about a calibration."""
 
     warnings: Annotated[
         tuple[str, ...],

@@ -32,7 +32,7 @@ _STRAIGHTNESS: Final = 0.2
 """Price of a path's slope, in units of the score."""
 
 _RAKE_LAYER: Final = 25e-6
-"""Thickness in m of the layer on the rake face, whose friction is no band."""
+"""Thickness in m of the friction layer on the rake face, which is not a shear band."""
 
 _RAKE_LAYER_SHARE: Final = 0.4
 """Thickness of this layer as a fraction of the radius, near the edge."""

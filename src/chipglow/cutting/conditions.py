@@ -133,8 +133,8 @@ class OutputWindow(Part):
     band_delay: Annotated[
         float,
         zero_to_one(
-            "When the band is developed: this part of the time between the last two valleys of "
-            "the cutting force after the later one."
+            "Time after the last valley of the cutting force at which the band is developed, as a "
+            "fraction of the time between the last two valleys."
         ),
     ] = 0.22
     band_duration: Annotated[

@@ -80,7 +80,7 @@ class Facts:
 
     @property
     def cut(self) -> Cut:
-        """The cut, for what is shown of a cut only."""
+        """The cut, for texts and figures that exist for cuts only."""
         assert self.analysis.cut is not None
         return self.analysis.cut
 

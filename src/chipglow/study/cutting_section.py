@@ -88,7 +88,7 @@ def _known(name: str, info: ValidationInfo) -> str:
 
 @dataclass(frozen=True)
 class WorkpieceAndTool(CuttingConditions):
-    """What is cut with which tool, and how fast."""
+    """Workpiece, tool and cutting conditions of a study."""
 
     workpiece: Annotated[
         str,

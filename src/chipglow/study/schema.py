@@ -68,8 +68,8 @@ class Study(Part):
     correction: Annotated[
         bool,
         Parameter(
-            "Whether the report of a cut corrects rake face and shear band for all that is known. "
-            "Standard uncertainties are those of uncertainty.inputs, else that of the heated chip."
+            "Whether the report of a cut corrects rake face and shear band for all known effects. "
+            "Standard uncertainties are taken from uncertainty.inputs, else from the heated chip."
         ),
     ] = True
 

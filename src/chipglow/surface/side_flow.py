@@ -210,8 +210,7 @@ class SideShape(Modifier):
             if not touching.any():
                 return emissivity
             rows, columns = sections.rows[touching], sections.columns[touching]
-            # Where the chip ends there is nothing: what comes from there comes from the
-            # surroundings.
+            # Beyond the end of the chip is void, from which the light of the surroundings comes.
             void = frame.material[rows, columns] == Material.VOID
             values = emissivity[rows, columns].astype(np.float64)
             if self.rake_emissivity is not None:

@@ -104,8 +104,9 @@ class FlatFieldCalibration(Brief):
     def netd(self, temperature: float) -> float:
         """Return the noise-equivalent temperature difference in K of a blackbody in K.
 
-        Temporal noise of the calibrated radiance, root mean square over the pixels, over dL/dT; at
-        least the noise of rounding to whole counts. NaN for a blackbody that saturates it.
+        Temporal noise of the calibrated radiance, root mean square over the pixels, divided by
+        dL/dT, and not below the noise of rounding to whole counts. NaN for a blackbody that
+        saturates it.
         """
         seen = float(self.point.band.radiance(temperature))
         if seen >= full_light(self.detector, self.point):

@@ -446,7 +446,7 @@ def _read_array(path: Path) -> Array:
             return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
     frames = read_matrix(path).values
     if len(frames) > 1:
-        raise ValueError(f"{path}: has {len(frames)} matrices, expected one")
+        raise ValueError(f"{path}: has {len(frames)} matrices, must have 1")
     return np.asarray(frames[0])
 
 

@@ -57,7 +57,7 @@ _LOCK_IN: Final = (1220, 3907, 1204, 2382)
 """First values of a line of lock-in data."""
 
 _DAY: Final = 86_400.0
-"""Seconds of a day, after which the clock begins anew."""
+"""Seconds per day, after which the clock restarts at 0."""
 
 _STAMPED: Final = 0.002
 """Two stamps of whole milliseconds may be off by that much in s."""

@@ -13,8 +13,8 @@ BINS_PER_PITCH: Final = 4
 """Bins for each pixel pitch of an edge-spread function, as in ISO 12233."""
 
 _WINDOW_PITCHES: Final = 10.0
-"""Distance from the edge in pixel pitches within which the line-spread function is transformed, at
-least."""
+"""Smallest distance from the edge, in pixel pitches, up to which the line-spread function is
+transformed."""
 
 _WINDOW_WIDTHS: Final = 5.0
 """The same distance in widths of the line-spread function."""

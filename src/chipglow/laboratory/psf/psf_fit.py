@@ -27,7 +27,7 @@ from chipglow.laboratory.psf.psf_models import (
 from chipglow.quantities import Array, Brief
 
 _LEAST_TURN: Final = pi / 18
-"""Smallest angle in rad between edges that count as of different orientation."""
+"""Smallest angle in rad between edges of different orientation."""
 
 _START_WIDTHS: Final = (0.5, 1.0, 1.7, 3.0, 5.0, 9.0)
 """Widths from which the fits start, in pixel pitches."""

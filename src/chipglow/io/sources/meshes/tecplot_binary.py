@@ -386,5 +386,5 @@ def _cells(cursor: _Cursor, zones: Sequence[_Zone], number: int, of: int) -> NDA
 def _before(zones: Sequence[_Zone], number: int, of: int) -> _Zone:
     """Return the zone whose numbers a zone shares."""
     if not 0 <= of < number - 1:
-        raise _damaged(f"zone {number} shares with zone {of + 1}, expected one before it")
+        raise _damaged(f"zone {number} shares with zone {of + 1}, which is not before it")
     return zones[of]

@@ -28,7 +28,7 @@ _NARROWEST_BAND: Final = 6
 _BLURRED: Final = 2.0
 _BANDED: Final = 0.5
 _AS_WELL, _AS_WELL_LAB = 2.0, 0.5
-"""Of the numbers of bands, the smallest is taken that fits up to this much worse than the best one.
+"""Factor and addend in CIE L*a*b* by which the misfit of fewer bands may exceed the smallest.
 
 A box that is off by 2 pixels shifts the edges of the bands, to which multiples of their number fit
 slightly better.
@@ -149,7 +149,7 @@ class ColourScale:
 
         Adjacent knots whose colours differ by no more than noise are not distinguished. The true
         value and the value that is read are then both anywhere in their range; in the range of a
-        single knot its middle is read.
+        single knot the centre is read.
         """
         first, last = self._runs
         below, above = (self._alike(side) for side in (-1, 1))
@@ -161,7 +161,7 @@ class ColourScale:
         return np.asarray(self.values[last] - self.values[first] + step)
 
     def _alike(self, side: int) -> NDArray[np.intp]:
-        """Return the farthest knot up to which colours are those of each knot, shape (m,)."""
+        """Return the farthest knot with the same colour as each knot and all between, (m,)."""
         count = len(self.labs)
         result = np.arange(count)
         growing = result.copy()

@@ -84,7 +84,7 @@ def _uncertainty(
 
 
 def _start_of_gradient(beyond: NDArray[np.float64], inside: NDArray[np.float64]) -> float:
-    """Return where colours leave that of the page, which is that of the legend's end.
+    """Return where colours depart from the page's colour, which equals the legend's end colour.
 
     NaN if they are not constant outside, or constant inside as well.
     """

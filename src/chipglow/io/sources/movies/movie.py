@@ -62,7 +62,7 @@ _LEGEND_MARGIN: Final = 3
 """Pixels around a legend that are left out with it."""
 
 _NOISE_OF_YUV: Final = 1.0
-"""Least noise in CIE L*a*b* of colours that are stored as 8 bits of luminance and chrominance.
+"""Smallest noise in CIE L*a*b* of colours stored as 8 bits of luminance and chrominance.
 
 It is the median error of ramps in `viridis` and `jet` as MJPEG and H.264 of good quality. Within a
 uniform area it is the same everywhere, and so cannot be seen there.
