@@ -209,6 +209,7 @@ class SingleReadings:
                 for name, chain, exposure in zip(small, chains, exposures, strict=True)
             }
             reach = camera.integration_time / 2
+            # The frames from half an exposure before to half an exposure after it.
             first, last = (scene.frame_at(begin + at * reach) for at in (-1.0, 3.0))
             frames = list(scene.frames(range(max(first, block[0]), min(last, block[-1]) + 1)))
         windows = []

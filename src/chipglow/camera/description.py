@@ -152,7 +152,7 @@ class CameraDescription(CameraSettings):
         if (
             self.lower_limit is not None
             and self.lower_limit <= _SUSPECT_LIMIT
-            and self.lower_limit % 10 == 0
+            and self.lower_limit % 10 == 0  # a round number, which people give in °C
         ):
             warn(
                 f"camera: lower_limit is {self.lower_limit:g} K, which is "

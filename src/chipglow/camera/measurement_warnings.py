@@ -7,7 +7,7 @@ import numpy as np
 
 from chipglow.camera.description import CameraDescription
 from chipglow.camera.detector.terms import EquivalentNoise, Lag, follows
-from chipglow.quantities import ZERO_CELSIUS, Array
+from chipglow.quantities import ROUNDING, ZERO_CELSIUS, Array
 from chipglow.scene import Raster
 
 BORDER_TOLERANCE: Final = 1.0
@@ -19,7 +19,7 @@ _FEWEST_SAMPLES: Final = 2.0
 
 def sampling_warning(camera: CameraDescription, scene: Raster) -> Iterator[str]:
     """Yield a warning if the scene's samples are too coarse for blur and footprint."""
-    if camera.pitch < _FEWEST_SAMPLES * scene.spacing * (1 - 1e-9):
+    if camera.pitch < _FEWEST_SAMPLES * scene.spacing * (1 - ROUNDING):
         yield (
             f"The scene's samples are {1e6 * scene.spacing:.3g} µm wide, more than half a "
             f"pixel of {1e6 * camera.pitch:.3g} µm: what changes within a sample is missing, and "

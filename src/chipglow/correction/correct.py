@@ -46,6 +46,8 @@ of an eighth of a pixel: 1e-4 to 8e-4 of the radiance.
 """
 
 _OUTLINE_ROUNDS: Final = 8
+"""Most rounds in which the outlines move to fit the image."""
+
 _OUTLINE_FOUND: Final = 0.02
 """Motion of the outlines in pixels below which they stay."""
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Final, Self
 
-from chipglow.quantities import Parameter, Part, zero_to_one
+from chipglow.quantities import ROUNDING, Parameter, Part, zero_to_one
 from chipglow.quantities.units import CUT_LENGTH, HEAT_TRANSFER, LENGTH, SPEED, TEMPERATURE, TIME
 from chipglow.scene import Raster
 
@@ -238,7 +238,7 @@ def unresolved(lengths: Mapping[str, float], cell: float) -> tuple[str, ...]:
         f"{CELLS_NEEDED[name]:g} or more: set cutting.numerics.cell to "
         f"{length / CELLS_NEEDED[name] * 1e6:.2g} um."
         for name, length in lengths.items()
-        if 0.0 < length < CELLS_NEEDED[name] * cell * (1 - 1e-9)
+        if 0.0 < length < CELLS_NEEDED[name] * cell * (1 - ROUNDING)
     )
 
 

@@ -98,6 +98,7 @@ def _sections(raster: Raster, tool: Tool, elements: SideElements) -> _Sections:
     count = max(int(along.max() / raster.spacing) + 1, 0)
     foot = tool.rake_point((np.arange(count) + 0.5) * raster.spacing)
     step = raster.spacing / 2
+    # Lines half a sample apart miss no sample; the first is within the samples on the face.
     heights = np.arange(raster.spacing / 4, TOUCHING + step, step)
     section = np.floor(along / raster.spacing).astype(np.intp)
     beside = np.flatnonzero((section >= 0) & (section < count))

@@ -232,6 +232,7 @@ def lower_range_limit(detector: Detector, point: OperationPoint) -> float:
             "lower_limit: detector: its signal is never "
             f"{detector.least_signal:g} times its noise, expected a smaller least_signal"
         )
+    # To 1e-4 of the radiance: a limit is stated to about 1 K, of which this is a hundredth.
     found = ends[0] if excess(ends[0]) > 0 else scipy.optimize.bisect(excess, *ends, xtol=1e-4)
     return max(float(point.band.temperature(exp(found))), COLDEST)
 

@@ -226,7 +226,8 @@ def _gain(windows: Array, place: Array, blur: float, image: Array) -> Array:
 
 def _level(windows: Array, image: Array) -> Array:
     """Return the mean radiance of each window, kept off 0 by 2 % of the brightest in the image."""
-    return np.asarray(windows.mean(axis=-1) + _DARK_FRACTION * np.percentile(image, 99.0))
+    bright = np.percentile(image, 99.0)  # the maximum may be a defective pixel
+    return np.asarray(windows.mean(axis=-1) + _DARK_FRACTION * bright)
 
 
 def _parabolas(offset: Array, blur: float) -> Array:

@@ -33,7 +33,10 @@ _WITHOUT_AREA: Final = re.compile(
 """Rigid lines, points, springs, dashpots, connectors, trusses and beams."""
 
 _VTK_FLAT: Final[Mapping[int, int]] = {3: 5, 4: 9, 6: 22, 8: 23}
+"""VTK's cell types of flat elements, by their number of nodes."""
+
 _VTK_SOLID: Final[Mapping[int, int]] = {4: 10, 5: 14, 6: 13, 8: 12, 10: 24, 15: 26, 20: 25}
+"""VTK's cell types of solid elements, by their number of nodes."""
 
 _PARTS: Final = ("PART", "END PART", "ASSEMBLY", "END ASSEMBLY", "INSTANCE", "END INSTANCE")
 _NOT_READ: Final = (
