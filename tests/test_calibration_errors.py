@@ -198,5 +198,6 @@ def test_the_command_writes_the_calibration_s_part(tmp_path, monkeypatch):
     most = np.nanmax(expected)
     lines = [line.split() for line in said.splitlines()]
     (line,) = (line for line in lines if line[:1] == ["calibration"])
+    # Two printed digits.
     assert float(line[-1]) == pytest.approx(most, rel=0.05)
     assert "Errors of calibration move all squares together" in said

@@ -186,6 +186,7 @@ def test_the_place_of_a_found_tool_is_uncertain_and_position_wins(folder):
         if uncertainty:
             most = np.nanmax(grid.frame_estimate.contribution("tool across"))
             (line,) = (line.split() for line in text.splitlines() if "tool across" in line)
+            # Two printed digits.
             assert float(line[-1]) == pytest.approx(most, rel=0.05)
 
 
