@@ -30,13 +30,16 @@ class Plan(Part):
         If a number is not positive, there are no widths, or two places have the same name.
     """
 
-    exposures: Annotated[int, Parameter("Exposures, spread evenly over the scene.", least=1)] = 9
+    exposures: Annotated[
+        int, Parameter("Exposures, spread evenly over the scene.", least=1, most=10_000)
+    ] = 9
     phases: Annotated[
         int,
         Parameter(
             "Positions of the pixels along each axis, evenly over a pixel, on which each headline "
             "is drawn: 9 gives 81.",
             least=1,
+            most=100,
         ),
     ] = 9
     textures: Annotated[
@@ -45,6 +48,7 @@ class Plan(Part):
             "Textures of the emissivity on which each headline is drawn: of the study's seed "
             "and those after it.",
             least=1,
+            most=1000,
         ),
     ] = 5
     rake_chip: Annotated[

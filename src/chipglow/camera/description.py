@@ -30,7 +30,7 @@ class CameraSettings(ExposureSettings):
     """Settings of a camera that a study states as `Camera` takes them."""
 
     pitch: Annotated[
-        float, Parameter("Distance between pixels on the scene.", LENGTH, most=1e-2)
+        float, Parameter("Distance between pixels on the scene.", LENGTH, least=1e-8, most=1e-2)
     ] = 6e-6
     psf_order: Annotated[
         Literal["optics", "detector"],

@@ -276,19 +276,28 @@ class CuttingSimulation(CutSettings):
         return (*unresolved(lengths, self.numerics.cell), _NO_BAND_WIDTH)
 
     @property
+    def point_count(self) -> float:
+        """Material points of the whole workpiece, about: its memory follows them."""
+        return self._points(self.conditions.cutting_length)
+
+    @property
     def point_steps(self) -> float:
         """Material points times time steps of the whole cut, about: its time follows them.
 
         With a steady tool it includes those of the cut that warms the tool.
         """
         numerics, conditions = self.numerics, self.conditions
-        side = numerics.cell / numerics.points_per_side
-        points = (numerics.upstream + numerics.downstream) * (numerics.depth + conditions.feed)
         step = numerics.courant * numerics.cell / (_sound(self) + conditions.speed)
-        own = points / side**2 * conditions.cutting_length / conditions.speed / step
+        own = self._points() * conditions.cutting_length / conditions.speed / step
         if not isinstance(self.tool_temperature, ToolBody):
             return own
         return own + self._long_cut().point_steps * _USUAL_ROUNDS / _MAX_ROUNDS
+
+    def _points(self, beyond: float = 0.0) -> float:
+        """Return the points in the computed region, and in a length in m that it does not hold."""
+        numerics, feed = self.numerics, self.conditions.feed
+        length = numerics.upstream + numerics.downstream + beyond
+        return length * (numerics.depth + feed) * (numerics.points_per_side / numerics.cell) ** 2
 
     def steady_tool(self) -> SteadyTool:
         """Return the tool after a long cut: cut and conduct in turn until it is steady.
