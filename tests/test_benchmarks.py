@@ -24,8 +24,8 @@ NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|\bnan\b|\binf\b")
 # What each program is called with, and rows of its table with the numbers that each holds at least.
 PROGRAMS = {
     "correction.py": (
-        "--scenes 1 --pixels 20 --processes 1",
-        {"rake face": 7, "band": 7, "outline found": 3},
+        "--scenes 1 --cuts 0 --pixels 20 --processes 1 --rows rows.csv",
+        {"rake face": 12, "band": 12, "outline found": 3},
     ),
     "app_latency.py": (
         "--turns 1 --controls Seed",

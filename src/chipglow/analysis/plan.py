@@ -3,8 +3,6 @@
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from chipglow.analysis.attribution import AttributionPlan
-from chipglow.analysis.corrected import CorrectionPlan
 from chipglow.analysis.places import LinePlace, Place, PointPlace, RegionPlace
 from chipglow.camera import ReferenceKind
 from chipglow.laboratory.emissivity import RegionSection
@@ -25,11 +23,6 @@ class Plan(Part):
     cut : bool
         Whether a scene that shows a cut is analysed segment by segment, at the rake face and the
         shear band. Otherwise the scene is analysed exposure by exposure.
-    attribution : AttributionPlan, optional
-        Effects among which the errors of the shown exposure are divided; None: they are not.
-    correction: CorrectionPlan, optional
-        What is known if the shown exposure of a cut is corrected beside the cutting edge; None: it
-        is not corrected.
 
     Raises
     ------
@@ -103,8 +96,6 @@ class Plan(Part):
     ] = field(default_factory=dict)
     places: tuple[Place, ...] = ()
     cut: bool = True
-    attribution: AttributionPlan | None = None
-    correction: CorrectionPlan | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -136,7 +136,15 @@ def run(study: Study, progress: Progress | None = None, resume: bool = False) ->
     """
     with fitted_study(study, progress, resume) as fitted:
         camera = study.camera.on(fitted.scene.raster, study.seed)
-        analysis = analyse(fitted.scene, fitted.surfaces, camera, study.plan, progress)
+        analysis = analyse(
+            fitted.scene,
+            fitted.surfaces,
+            camera,
+            study.plan,
+            progress,
+            attribution=study.attribution,
+            correction=study.known,
+        )
         notes = fitted.notes
         warnings = (*notes.warnings, *analysis.warnings)
         return replace(analysis, assumed=tuple(notes.assumed), warnings=warnings)
