@@ -46,7 +46,7 @@ _Coalition = frozenset[str]
 
 
 class PixelReading(NamedTuple):
-    """What a camera reads: temperatures in K and flags as those of a measurement, each (y, x)."""
+    """Reading of a camera: temperatures in K and flags of a measurement, each (y, x)."""
 
     temperature: Array
     flags: NDArray[np.uint8]
@@ -194,7 +194,7 @@ class Stages:
 
 @dataclass(frozen=True, eq=False)
 class ExposedChain:
-    """What a camera reads of one exposure with some of its effects switched on.
+    """Readings of a camera in one exposure, with some of its effects switched on.
 
     Effects are members of `Effect`; the kind of a term, such as ``veil`` or ``shot-noise``, names
     one of the terms of `Effect.OPTICS` or `Effect.DETECTOR`. Switched off, an effect is ideal:
@@ -224,7 +224,7 @@ class ExposedChain:
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """Effects that are there, in the order of the light."""
+        """Effects that are present, in the order of the light."""
         camera, detector = self.camera, self.camera.detector
         absent = {
             Effect.REFLECTION: not self.reflects,

@@ -46,11 +46,13 @@ of an eighth of a pixel: 1e-4 to 8e-4 of the radiance.
 """
 
 _OUTLINE_ROUNDS: Final = 8
+"""Most rounds in which the outlines move to fit the image."""
+
 _OUTLINE_FOUND: Final = 0.02
 """Motion of the outlines in pixels below which they stay."""
 
 _BORDER: Final = 3
-"""Width in pixels of the border whose values depend on what is beyond the image."""
+"""Width in pixels of the border whose values depend on radiance from beyond the image."""
 
 _MARGIN: Final = 4
 """Pixels beyond the image on each side whose radiance is unknown too.

@@ -46,7 +46,7 @@ _PSF_DRAWS: Final = 6
 """Draws of the point spread function within its uncertainty."""
 
 _LEAST_DATA: Final = 1e-4
-"""Least number of data for a part: below it, a detail would be larger than 100 cells."""
+"""Smallest number of data for a part: below it, a detail would be larger than 100 cells."""
 
 
 @dataclass(frozen=True, eq=False)
