@@ -106,9 +106,9 @@ def test_stated_uncertainties_come_before_those_of_the_heated_chip(analysis):
         "surface.chips.chip 2.body.mean": {"standard": 0.03},
         "camera.psf.numerical_aperture": {"standard": "2 %"},
     }
-    plan = Study(uncertainty={"inputs": stated}).plan.correction
+    plan = Study(uncertainty={"inputs": stated}).known
     assert plan == CorrectionPlan({"chip 2": 0.03}, pytest.approx(0.02))
-    assert Study(correction=False).plan.correction is None
+    assert Study(correction=False).known is None
 
 
 PLACE = SimpleNamespace(

@@ -246,7 +246,7 @@ def test_texture_moves_with_the_material(feature, follow):
 
 
 def mean_shift(scene):
-    return replace(CHIP_1, follow="mean").prepare(scene).bare.shift
+    return replace(CHIP_1, follow="mean").prepare(scene).features.shift
 
 
 def test_mean_shift_is_velocity_times_time():

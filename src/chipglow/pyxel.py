@@ -27,7 +27,7 @@ from chipglow.surface import Surface
 
 
 @dataclass(frozen=True)
-class PhotonResponse:
+class PerPhotonResponse:
     """A band's response to photons instead of energy: R(λ) λ / λ₀."""
 
     band: Band
@@ -114,5 +114,5 @@ def _setup(study: str, chip: str | None) -> tuple[Scene, Surface, Camera]:
         raise ValueError(f"chip: {name!r}, expected one of {', '.join(fitted.surfaces)}")
     camera = loaded.camera.on(fitted.scene.raster, loaded.seed)
     band = camera.band
-    counted = Band(band.lower, band.upper, PhotonResponse(band, _central_wavelength(band)))
+    counted = Band(band.lower, band.upper, PerPhotonResponse(band, _central_wavelength(band)))
     return fitted.scene, fitted.surfaces[name], replace(camera, band=counted)

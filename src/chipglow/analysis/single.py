@@ -5,7 +5,7 @@ surfaces. Each exposes only a window of the scene around the place. The light th
 window from beyond it is computed with the nominal camera and surface.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.cut import Progress
 from chipglow.analysis.engine import schedule_of
+from chipglow.analysis.images import ALL, CASES
 from chipglow.analysis.outside import fractions_outside
 from chipglow.analysis.places import Place
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.read import Schedule, read_place
 from chipglow.camera import Camera
-from chipglow.camera.chain import Chain, expose_chains, read_temperature
+from chipglow.camera.chain import Chain, LightBeyond, expose_chains
 from chipglow.quantities import Array
-from chipglow.scene import Frame, Raster, Scene, sample
+from chipglow.scene import Frame, Raster, Scene
 from chipglow.scene.lines import nearest
 from chipglow.surface import FeatureTrends, ModifiedSurface, Surface
 
@@ -37,6 +38,8 @@ EXPOSURE, TEXTURE, ACROSS, DOWN, NOISE = RANDOM = (
 REFERENCE, MEASURED, BELOW, SATURATED = range(4)
 """Values of a reading: temperatures, and fractions of its place that cannot be read."""
 
+_EVERY_EFFECT: Final = {ALL: CASES[ALL]}
+
 _BLUR_WIDTHS: Final = 3.0
 """Margin of a window around its place, in full widths at half maximum of the blur."""
 
@@ -49,16 +52,38 @@ _SEEDS: Final = 2**31
 
 @dataclass(frozen=True, eq=False)
 class _Window:
-    """Part of a scene during one exposure; `beyond` is light on the nominal camera's pixels."""
+    """A place, and the part of a scene around it."""
 
-    scene: Scene
     place: Place
     surface: str
     rows: NDArray[np.bool_]  # of the readings
+    scene: Scene
+    whole: Raster  # of which the scene is a part
+    beyond: LightBeyond | None = None
+
+    def chain(self, camera: Camera, surface: Surface) -> Chain:
+        """Return the chain of the part, with the pixels that a camera has on the whole scene."""
+        shift = self.scene.raster.left - self.whole.left, self.whole.top - self.scene.raster.top
+        if any(shift):
+            right, down = np.mod(np.subtract(camera.offset, shift), camera.pitch).tolist()
+            camera = replace(camera, offset=(right, down))
+        return Chain(camera, self.scene, surface, beyond=self.beyond)
+
+
+@dataclass(frozen=True, eq=False)
+class _Moment:
+    """One of the exposures that are spread over a scene, in s, and the windows that are read."""
+
     start: float
-    limits: tuple[float, float]  # in which an exposure must lie, in s
-    beyond: Array | None = None
-    pixels: Raster | None = None
+    duration: float
+    limits: tuple[float, float]  # in which an exposure must lie
+    windows: tuple[_Window, ...] = ()
+
+    def begin(self, duration: float) -> float:
+        """Return the start of an exposure of some duration in the middle of this one."""
+        first, last = self.limits
+        middle = self.start + (self.duration - duration) / 2
+        return max(min(middle, last - duration), first)
 
 
 class SingleReadings:
@@ -119,15 +144,15 @@ class SingleReadings:
             raise ValueError(f"{unknown[0]}: no such place or reading, expected one of {names}")
         kept = {name: key for name, key in every.items() if not at or name in at or key[2] in at}
         self.names, self.places = tuple(kept), tuple(key[2] for key in kept.values())
-        self._raster = scene.raster
-        self._reference, self._duration = plan.reference, spread.integration_time
+        self._reference = plan.reference
         keys = {key[:2] for key in kept.values()}
         owners = [key[:2] for key in every.values()]
         self._kept = np.array([name in kept for name in every])
         self._rows = {key: np.array([one == key for one in owners]) for key in keys}
         self._size = len(every)
-        self._exposures = [
-            self._windows(scene, surfaces, replace(camera, shape=None), schedule, number)
+        nominal = _Nominal(scene, surfaces, replace(camera, shape=None))
+        self._moments = [
+            self._moment(nominal, schedule, number, spread.integration_time)
             for number in range(len(schedule.drawn))
         ]
         used = {schedule.views[n].surface for n, _ in keys}
@@ -150,82 +175,94 @@ class SingleReadings:
         moved = np.multiply([draw.get(name, 0.0) for name in (ACROSS, DOWN)], camera.pitch)
         right, down = (moved + camera.offset).tolist()
         seen = replace(camera, shape=None, offset=(right, down)).redrawn(noise)
+        moment = self._moments[int(draw.get(EXPOSURE, 0.0) * len(self._moments))]
+        start = moment.begin(camera.integration_time)
         values = np.full((self._size, 4), np.nan)
-        number = int(draw.get(EXPOSURE, 0.0) * len(self._exposures))
-        for window in self._exposures[number]:
+        for window in moment.windows:
             surface = surfaces[window.surface].redrawn(texture)
-            moved = _on_grid(seen, self._raster, window)
-            stack, flags, pixels = self._look(window, moved, surface)
-            values[window.rows, :BELOW] = read_place(window.place, stack, pixels).values
-            outside = fractions_outside(window.place, flags, stack[MEASURED], pixels)
+            chain = window.chain(seen, surface).at(start, self._reference)
+            images, pixels = chain.stack(_EVERY_EFFECT), chain.pixels
+            values[window.rows, :BELOW] = read_place(window.place, images, pixels).values
+            outside = fractions_outside(window.place, chain.read().flags, images[MEASURED], pixels)
             values[window.rows, BELOW:] = outside
         return np.asarray(values[self._kept])
 
-    def _look(
-        self, window: _Window, camera: Camera, surface: Surface
-    ) -> tuple[Array, NDArray[np.uint8], Raster]:
-        """Return `REFERENCE` and `MEASURED` of a window, and the flags of its pixels."""
-        start = self._start(camera, window.start, window.limits)
-        chain = Chain(camera, window.scene, surface).at(start, self._reference)
-        pixels, radiance = camera.pixels(window.scene.raster), chain.radiance()
-        if window.beyond is not None and window.pixels is not None:
-            light = sample(window.beyond, window.pixels, pixels.centres)
-            radiance = np.maximum(radiance + np.nan_to_num(light), 0.0)
-        kelvins, flags = read_temperature(camera, radiance, start)
-        reference = chain.reference()
-        measured = np.where(np.isnan(reference), np.nan, kelvins)
-        return np.stack([reference, measured]), flags, pixels
-
-    def _start(self, camera: Camera, start: float, limits: tuple[float, float]) -> float:
-        """Return the start of a camera's exposure in the middle of one of the spread ones."""
-        first, last = limits
-        middle = start + (self._duration - camera.integration_time) / 2
-        return max(min(middle, last - camera.integration_time), first)
-
-    def _windows(
-        self,
-        scene: Scene,
-        surfaces: Mapping[str, Surface],
-        camera: Camera,
-        schedule: Schedule,
-        number: int,
-    ) -> list[_Window]:
-        """Return the windows of the places in one exposure."""
+    def _moment(
+        self, nominal: "_Nominal", schedule: Schedule, number: int, duration: float
+    ) -> _Moment:
+        """Return an exposure of a schedule, with a window around each place that is read."""
         start = float(schedule.starts[schedule.drawn[number]])
-        frame = scene.frame_at(start)
-        block = next(one for one in scene.blocks if frame in one)
-        limits = float(scene.times[block[0]]), float(scene.times[block[-1]] + scene.frame_spacing)
-        if len(scene.times) == 1:
-            limits = -np.inf, np.inf
-        begin = self._start(camera, start, limits)
-        used = {schedule.views[n].surface for n, _ in self._rows}
-        small = [name for name in used if _is_local(surfaces[name]) and camera.line_time is None]
-        whole, frames = {}, []
-        if small:
-            chains = [Chain(camera, scene, surfaces[name]) for name in small]
-            exposures = expose_chains(chains, begin)
-            whole = {
-                name: chain.exposed(exposure).radiance()
-                for name, chain, exposure in zip(small, chains, exposures, strict=True)
-            }
-            reach = camera.integration_time / 2
-            first, last = (scene.frame_at(begin + at * reach) for at in (-1.0, 3.0))
-            frames = list(scene.frames(range(max(first, block[0]), min(last, block[-1]) + 1)))
+        moment = _Moment(start, duration, _limits(nominal.scene, start))
+        crops = nominal.crops({schedule.views[n].surface for n, _ in self._rows}, moment)
         windows = []
-        for key, rows in self._rows.items():
-            view = schedule.views[key[0]]
-            place = view.places[number][key[1]]
-            part = _around(place, scene.raster, camera) if view.surface in whole else None
-            one = _Window(scene, place, view.surface, rows, start, limits)
-            if part is not None:
-                one = replace(one, scene=_cropped(frames, scene, part))
-                moved = _on_grid(camera, scene.raster, one)
-                image = Chain(moved, one.scene, surfaces[view.surface]).at(begin).radiance()
-                pixels = moved.pixels(one.scene.raster)
-                light = nearest(whole[view.surface], camera.pixels(scene.raster), pixels.centres)
-                one = replace(one, beyond=np.nan_to_num(light - image), pixels=pixels)
-            windows.append(one)
-        return windows
+        for (view, place), rows in self._rows.items():
+            seen = schedule.views[view]
+            windows.append(crops.window(seen.places[number][place], seen.surface, rows))
+        return replace(moment, windows=tuple(windows))
+
+
+@dataclass(frozen=True, eq=False)
+class _Nominal:
+    """A scene with the surfaces and the camera of which single readings vary."""
+
+    scene: Scene
+    surfaces: Mapping[str, Surface]
+    camera: Camera
+
+    def crops(self, used: Collection[str], moment: _Moment) -> "_Crops":
+        """Return parts of the scene in an exposure; of surfaces that are not local, the whole."""
+        scene, camera = self.scene, self.camera
+        begin = moment.begin(camera.integration_time)
+        local = [name for name in used if _is_local(self.surfaces[name])]
+        if camera.line_time is not None or not local:
+            return _Crops(self, begin, {}, ())
+        chains = [Chain(camera, scene, self.surfaces[name]) for name in local]
+        exposures = expose_chains(chains, begin)
+        images = {
+            name: chain.exposed(exposure).radiance()
+            for name, chain, exposure in zip(local, chains, exposures, strict=True)
+        }
+        reach, block = camera.integration_time / 2, _block(scene, moment.start)
+        first, last = (scene.frame_at(begin + at * reach) for at in (-1.0, 3.0))
+        frames = scene.frames(range(max(first, block[0]), min(last, block[-1]) + 1))
+        return _Crops(self, begin, images, tuple(frames))
+
+
+@dataclass(frozen=True, eq=False)
+class _Crops:
+    """Parts of a scene during the nominal exposure that begins at `start` in s."""
+
+    nominal: _Nominal
+    start: float
+    images: Mapping[str, Array]  # radiance of the pixels of the whole scene, of local surfaces
+    frames: Sequence[Frame]  # of an exposure of up to twice the duration
+
+    def window(self, place: Place, surface: str, rows: NDArray[np.bool_]) -> _Window:
+        """Return the window of a place on a surface, of which the readings have these rows."""
+        scene, camera = self.nominal.scene, self.nominal.camera
+        whole = _Window(place, surface, rows, scene, scene.raster)
+        part = _around(place, scene.raster, camera) if surface in self.images else None
+        if part is None:
+            return whole
+        window = replace(whole, scene=_cropped(self.frames, scene, part))
+        alone = window.chain(camera, self.nominal.surfaces[surface]).at(self.start)
+        light = nearest(self.images[surface], camera.pixels(scene.raster), alone.pixels.centres)
+        missing = np.nan_to_num(light - alone.radiance())
+        return replace(window, beyond=LightBeyond(missing, alone.pixels))
+
+
+def _block(scene: Scene, start: float) -> range:
+    """Return the frames without a gap among which an exposure begins."""
+    frame = scene.frame_at(start)
+    return next(one for one in scene.blocks if frame in one)
+
+
+def _limits(scene: Scene, start: float) -> tuple[float, float]:
+    """Return the times in s within which an exposure near `start` must lie."""
+    if len(scene.times) == 1:
+        return -np.inf, np.inf
+    block = _block(scene, start)
+    return float(scene.times[block[0]]), float(scene.times[block[-1]] + scene.frame_spacing)
 
 
 def _is_local(surface: Surface) -> bool:
@@ -265,13 +302,3 @@ def _cropped(frames: Sequence[Frame], scene: Scene, part: tuple[slice, slice]) -
         {name: np.stack([getattr(frame, name)[part] for frame in frames]) for name in names},
         scene.tool,
     )
-
-
-def _on_grid(camera: Camera, scene: Raster, window: _Window) -> Camera:
-    """Return a camera on a scene with the same pixels on a window of it."""
-    own = window.scene.raster
-    shift = own.left - scene.left, scene.top - own.top
-    if not any(shift):
-        return camera
-    right, down = np.mod(np.subtract(camera.offset, shift), camera.pitch).tolist()
-    return replace(camera, offset=(right, down))

@@ -22,8 +22,7 @@ from chipglow.quantities import Array, unchecked
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study
 from chipglow.surface import UniformSurface
-from chipglow.text import read_small_text, read_yaml
-from chipglow.text.yaml_file import parse_yaml
+from chipglow.text import parse_yaml, read_small_text, read_yaml
 
 QUICK_SAMPLES: Final = 35_000
 """Samples of a frame up to which a picture is computed at once, without a coarser one before."""

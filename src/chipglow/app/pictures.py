@@ -344,12 +344,12 @@ class SceneModel:
             effects={ALL: CASES[ALL]},
         )
         laid = {CURSOR: camera.prepare(surface.redrawn(0), scene)}
-        readings = read(scene, {CURSOR: surface}, laid, camera, schedule, progress)
-        reference, measured, _ = np.moveaxis(readings.values[0, 0], -1, 0)
-        error = measured - reference
+        data = read(scene, {CURSOR: surface}, laid, camera, schedule, progress).data
+        seen = data.isel(exposure=0, effects=0)
+        error = (seen.measured - seen.reference).values[0]
         lines = {
-            name: np.concatenate(readings.along[row, 0, :, :, 1]) - ZERO_CELSIUS
-            for row, name in enumerate(LINES)
+            name: np.concatenate(seen.line_measured.sel(line=line).values) - ZERO_CELSIUS
+            for name, line in LINES.items()
         }
         is_known = np.isfinite(error).all()
         return Drawn(

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera.camera import Camera
 from chipglow.camera.effect import EVERY, Effect
-from chipglow.camera.exposure import Exposure, SpectralView, expose
+from chipglow.camera.exposure import Exposure, SpectralView
 from chipglow.camera.exposure_kernels import Check
 from chipglow.camera.image import form_image, image_formation
 from chipglow.camera.measurement import range_flags
@@ -30,7 +30,7 @@ from chipglow.camera.reference import (
     true_kind,
 )
 from chipglow.quantities import Array
-from chipglow.scene import Scene
+from chipglow.scene import Raster, Scene, sample
 from chipglow.surface import EmissivityField, ModifiedSurface, Surface, UniformSurface
 
 _IMAGES_KEPT: Final = 128
@@ -61,6 +61,19 @@ class Exposures(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
+class LightBeyond:
+    """Light that reaches the pixels from beyond a part of a scene: it is blurred into the part."""
+
+    image: Array
+    """Radiance in W/(m² sr) on some pixels, (y, x); negative where the edge continues too bright"""
+    pixels: Raster
+
+    def on(self, pixels: Raster) -> Array:
+        """Return the radiance on other pixels, linear between these; 0 beyond them."""
+        return np.nan_to_num(sample(self.image, self.pixels, pixels.centres))
+
+
+@dataclass(frozen=True, eq=False)
 class Chain:
     """A camera in front of a scene: from the true temperatures to the reading of every pixel.
 
@@ -74,6 +87,8 @@ class Chain:
         The emissivity.
     field : EmissivityField, optional
         The surface on the scene, from `Camera.prepare`, if it is known.
+    beyond : LightBeyond, optional
+        Light from beyond a scene that is part of another, with all effects.
 
     Examples
     --------
@@ -86,6 +101,7 @@ class Chain:
     scene: Scene
     surface: Surface
     field: EmissivityField | None = None
+    beyond: LightBeyond | None = None
 
     @cached_property
     def emissivity(self) -> EmissivityField:
@@ -124,7 +140,7 @@ class Chain:
         ValueError
             If the scene does not cover the integration time or the pixels.
         """
-        (exposure,) = self.camera.expose_fields(self.scene, (self.emissivity,), start, check)
+        (exposure,) = expose_chains([self], start, check)
         return self.exposed(replace(exposure, effects=self.surface.effects), reference)
 
     def exposed(
@@ -136,8 +152,13 @@ class Chain:
         pixels have in common.
         """
         apart = lru_cache(1)(partial(_exposures, self, exposure))
-        stages = Stages(exposure, apart, shares_blur)
+        stages = Stages(exposure, apart, shares_blur, self.beyond)
         return ExposedChain(self.camera, stages, reference, self.reflects)
+
+    @property
+    def view(self) -> SpectralView:
+        """The surface on the scene in the camera's band and surroundings."""
+        return SpectralView(self.emissivity, self.camera.band, self.camera.reflected)
 
     @property
     def reflects(self) -> bool:
@@ -153,6 +174,7 @@ class Stages:
         exposure: Exposure,
         apart: Callable[[], Exposures] | None = None,
         shares_blur: bool = False,
+        beyond: LightBeyond | None = None,
     ) -> None:
         if not isinstance(exposure, Exposure):
             raise ValueError(
@@ -163,7 +185,7 @@ class Stages:
         sources = partial(_source, exposure, apart)
         blurred = partial(blur, exposure.mean_radiance, spacing=exposure.raster.spacing)
         kept = lru_cache(1)(blurred) if shares_blur else None
-        self.radiance = lru_cache(_IMAGES_KEPT)(partial(_formed, sources, kept))
+        self.radiance = lru_cache(_IMAGES_KEPT)(partial(_formed, sources, kept, beyond))
         self.read = lru_cache(_READINGS_KEPT)(partial(_read, self.radiance, exposure.start))
         self.reference = lru_cache(_READINGS_KEPT)(
             partial(reference_temperature, exposure=exposure)
@@ -190,6 +212,11 @@ class ExposedChain:
     def exposure(self) -> Exposure:
         """The exposure with all effects."""
         return self.stages.exposure
+
+    @property
+    def pixels(self) -> Raster:
+        """The pixels on the scene."""
+        return self.camera.pixels(self.exposure.raster)
 
     def through(self, camera: Camera) -> "ExposedChain":
         """Return the chain with another camera of the same band and integration time."""
@@ -315,10 +342,8 @@ def expose_chains(
     chains: Sequence[Chain], start: float, check: Check | None = None
 ) -> tuple[Exposure, ...]:
     """Expose chains of a scene in one pass; their cameras may differ in the band alone."""
-    camera = chains[0].camera
-    delays = camera.row_delays(chains[0].scene.raster)
-    views = [SpectralView(one.emissivity, one.camera.band, one.camera.reflected) for one in chains]
-    return expose(chains[0].scene, views, start, camera.integration_time, delays, check)
+    first = chains[0]
+    return first.camera.expose_views(first.scene, [one.view for one in chains], start, check)
 
 
 def chains_in_bands(surface: Surface, scene: Scene, cameras: Sequence[Camera]) -> tuple[Chain, ...]:
@@ -340,7 +365,7 @@ def expose_apart(
     chain: Chain, start: float, reference: ReferenceKind = "maximum", check: Check | None = None
 ) -> ExposedChain:
     """Expose once, with the effects of the surface switched off too, in one pass."""
-    exposures = _in_one_pass(chain, _views(chain), start, check)
+    exposures = chain.camera.expose_views(chain.scene, _views(chain), start, check)
     stages = Stages(exposures[0], lambda: Exposures(*exposures))
     return ExposedChain(chain.camera, stages, reference, chain.reflects)
 
@@ -371,6 +396,7 @@ def _source(exposure: Exposure, apart: Callable[[], Exposures] | None, name: str
 def _formed(
     source: Callable[[str], Exposure],
     blurred: Callable[[PointSpreadFunction], Array] | None,
+    beyond: LightBeyond | None,
     camera: Camera,
     name: str,
     moves: bool,
@@ -385,7 +411,10 @@ def _formed(
     if is_common and psf and camera.psf_order == "optics" and "footprint" not in psf.includes:
         assert blurred is not None
         radiance, camera = blurred(psf), replace(camera, psf=None)
-    return form_image(camera, radiance, exposure.raster, gather)
+    image = form_image(camera, radiance, exposure.raster, gather)
+    if beyond is None:
+        return image
+    return np.maximum(image + beyond.on(camera.pixels(exposure.raster)), 0.0)
 
 
 def _read(formed: Callable[..., Array], start: float, camera: Camera, *how: object) -> PixelReading:
@@ -394,7 +423,8 @@ def _read(formed: Callable[..., Array], start: float, camera: Camera, *how: obje
 
 
 def _exposures(chain: Chain, seen: Exposure) -> Exposures:
-    return Exposures(seen, *_in_one_pass(chain, _views(chain)[1:], seen.start))
+    others = chain.camera.expose_views(chain.scene, _views(chain)[1:], seen.start)
+    return Exposures(seen, *others)
 
 
 def _views(chain: Chain) -> list[SpectralView]:
@@ -402,18 +432,10 @@ def _views(chain: Chain) -> list[SpectralView]:
     scene, band = chain.scene, chain.camera.band
     plain = _unreflecting(chain.surface)
     return [
-        SpectralView(chain.emissivity, band, chain.camera.reflected),
+        chain.view,
         SpectralView(plain.prepare(scene, band), band),
         SpectralView(UniformSurface(1.0).prepare(scene, band), band),
     ]
-
-
-def _in_one_pass(
-    chain: Chain, views: Sequence[SpectralView], start: float, check: Check | None = None
-) -> tuple[Exposure, ...]:
-    camera, scene = chain.camera, chain.scene
-    delays = camera.row_delays(scene.raster)
-    return expose(scene, views, start, camera.integration_time, delays, check)
 
 
 def _unreflecting(surface: Surface) -> Surface:

@@ -15,6 +15,7 @@ from chipglow.cli.screen import current
 from chipglow.study import (
     Progress as Report,
     Study,
+    check_cost,
     expected_cost,
     is_cut,
     is_damaged,
@@ -45,6 +46,7 @@ def confirm_cost(study: Study, resume: bool, agreed: bool) -> None:
         return
     if is_damaged(study):
         console.print("The cached scene of this cut is damaged; it is computed again.")
+    check_cost(study)
     kept = kept_progress(study)
     say_checkpoint("cut", kept, resume)
     cost = expected_cost(study)

@@ -46,7 +46,7 @@ class Facts:
         camera = analysis.camera
         values = {
             "analysis": analysis,
-            "attribution_reference": getattr(analysis.plan.attribution, "reference", ""),
+            "attribution_reference": data.attrs.get("attribution_reference", ""),
             "camera": camera,
             "cause": data.exposure.attrs["title"],
             "chip": cut.chip if cut else None,

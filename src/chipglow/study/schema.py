@@ -88,8 +88,7 @@ class Study(Part):
     @property
     def plan(self) -> Plan:
         """The plan of the analysis, with PSF widths around the camera's."""
-        known = self._known() if self.correction else None
-        plan = replace(self.analysis, attribution=self.attribution, correction=known)
+        plan = self.analysis
         psf = self.camera.build().psf
         ratio = 1.0 if psf is None else psf.fwhm / AnnularAperturePSF().fwhm
         if "psf_widths" not in self.analysis.given and ratio != 1.0:
@@ -100,8 +99,11 @@ class Study(Part):
         (name,) = surface_names(self.surface)
         return replace(plan, rake_chip=name, band_chip=name)
 
-    def _known(self) -> CorrectionPlan:
-        """Return the uncertainties of emissivity and PSF width among the inputs of the budget."""
+    @property
+    def known(self) -> CorrectionPlan | None:
+        """What a correction knows: uncertainties of emissivity and PSF width, by the budget."""
+        if not self.correction:
+            return None
         inputs = {one.name: one for one in self.uncertainty.build(self).inputs}
         width = inputs.get("camera.psf.fwhm", inputs.get("camera.psf.numerical_aperture"))
         emissivity = {}

@@ -8,13 +8,13 @@ from functools import cache, cached_property
 from hashlib import sha256
 from importlib.metadata import version
 from itertools import product
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 import pandas as pd
 import xarray as xr
-import yaml
 from scipy.stats import qmc
 
 from chipglow.analysis import Analysis, headlines
@@ -24,7 +24,7 @@ from chipglow.quantities import Quantity, adapter, changed, setting_at
 from chipglow.study.running import Progress, cut, is_cut, run, scene_inputs
 from chipglow.study.schema import Study
 from chipglow.study.workers import Client, local_client, on_client
-from chipglow.text import Notes, result_html
+from chipglow.text import Notes, parse_yaml, result_html
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,8 +41,11 @@ NUMBERS: Final = ("reference", "error", "uncertainty", "psf_portion", "true_erro
 FRACTIONS: Final = ("below_range", "saturated")
 """Stored fractions of each reading's place below the lower range limit, and saturated."""
 
+MOST_POINTS: Final = 100_000
+"""Points of a sweep: each is a file in one folder, and a study in memory."""
+
 _POINTS: Final = "points"
-_RANGE: Final = re.compile(r"([^:]+):([^:]+)(?::(\d+))?")
+_RANGE: Final = re.compile(r"([^:]+):([^:]+)(?::(\d{1,18}))?")
 _QUANTITY: Final = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
 
@@ -79,7 +82,7 @@ class Sweep:
         file = Path(folder) / DESCRIPTION
         try:
             return cls._stated(Path(folder), file.read_text(encoding="utf-8"))
-        except (ValueError, LookupError, TypeError):
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
             raise ValueError(f"{file}: is damaged; run the sweep again") from None
 
     @classmethod
@@ -290,9 +293,12 @@ def axis(values: str | Sequence[Any]) -> list[Any]:
     if not isinstance(values, str):
         return list(values)
     if (ends := _RANGE.fullmatch(values)) is None:
-        return [yaml.safe_load(one) for one in values.split(",")]
+        return [parse_yaml(one) for one in values.split(",")]
     first, last, count = ends.groups()
-    return [between(first, last, part) for part in np.linspace(0.0, 1.0, int(count or 2))]
+    number = int(count or 2)
+    if number > MOST_POINTS:
+        raise ValueError(f"{values}: makes {number} values, expected up to {MOST_POINTS}")
+    return [between(first, last, part) for part in np.linspace(0.0, 1.0, number)]
 
 
 def between(first: object, last: object, part: float) -> str | float:
@@ -364,6 +370,9 @@ def points_of(
     """Yield the settings of each point as a study takes them."""
     if not axes:
         raise ValueError("vary: name at least one setting")
+    count = prod(map(len, axes.values())) if method == "grid" else samples
+    if not 1 <= count <= MOST_POINTS:
+        raise ValueError(f"vary: makes {count} points, expected 1 to {MOST_POINTS}")
     if method == "grid":
         for values in product(*axes.values()):
             yield dict(zip(axes, values, strict=True))
@@ -453,7 +462,7 @@ def _record(path: Path) -> Mapping[str, Any] | None:
     """Return the content of a point's file; None if it is missing or damaged."""
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
-    except (FileNotFoundError, ValueError):
+    except (FileNotFoundError, ValueError, RecursionError):
         return None
     if not isinstance(record, dict):
         return None

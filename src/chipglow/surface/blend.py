@@ -13,7 +13,7 @@ from numba import get_num_threads, njit
 from numpy.typing import NDArray
 
 from chipglow.scene import Material
-from chipglow.surface.texture import WIDTH, WRAP, emissivity_at, patch
+from chipglow.surface.texture import PADDED_SIZE, WRAP, emissivity_at, patch
 
 STRAIN_OF_WORKPIECE: Final = 0.3
 """Plastic strain up to which the workpiece's map holds alone."""
@@ -62,7 +62,7 @@ def _place(x, y, shift, scale, corner, across, down):  # type: ignore[no-untyped
         u, v = (x[i] - shift[0]) * scale, (y[i] - shift[1]) * scale
         before, above = np.floor(u), np.floor(v)
         across[i], down[i] = u - before, v - above
-        corner[i] = (np.int32(above) & WRAP) * np.int32(WIDTH) + (np.int32(before) & WRAP)
+        corner[i] = (np.int32(above) & WRAP) * np.int32(PADDED_SIZE) + (np.int32(before) & WRAP)
 
 
 @njit(**_FAST)

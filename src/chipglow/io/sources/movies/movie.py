@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator
 
 from chipglow.io.nearest import fill
-from chipglow.io.sources.conventions import SI_UNITS, PlacedGrid, Placement
+from chipglow.io.sources.conventions import SI_UNITS, PlacedGrid, PlacedSource
 from chipglow.io.sources.movies.colour_scale import (
     ColourScale,
     ColourUncertainty,
@@ -41,7 +41,7 @@ from chipglow.io.sources.movies.overlays import (
     polygon_mask,
 )
 from chipglow.io.sources.movies.pictures import MovieIndex, index_movie, pictures
-from chipglow.io.sources.source import Source, SourceError, Survey, even_times, extent_of, naming
+from chipglow.io.sources.source import SourceError, Survey, even_times, extent_of, naming
 from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, parse_unit
 from chipglow.scene import FIELD_UNITS, FILLED, Material, Raster, SampledFrame
@@ -154,7 +154,7 @@ def _number(place: str, name: str, value: str | float) -> float:
 
 
 @dataclass(frozen=True)
-class MovieSource(Source, Part):
+class MovieSource(PlacedSource, Part):
     """Movies of fields with a colour scale, a movie a field.
 
     They have the same size and number of pictures. ``files`` is the movie of the temperature if
@@ -230,8 +230,6 @@ class MovieSource(Source, Part):
         None
     )
     files: str = ""
-    interval: float | None = None
-    placement: Placement = field(default_factory=Placement)
 
     def __post_init__(self) -> None:
         super().__post_init__()
