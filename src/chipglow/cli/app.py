@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from chipglow.cli import options as opt
+from chipglow.cli.band import band
 from chipglow.cli.boundary import Boundary
 from chipglow.cli.budget import budget
 from chipglow.cli.camera import calibrate, psf
@@ -39,6 +40,7 @@ EXAMPLES = {
     "init": "study.yaml",
     "run": "study.yaml --out results",
     "error": "scene.nc --emissivity 0.7 --out results",
+    "band": "--width 20um --rise 300K --speed 4m/s --camera study.yaml --plot band.png",
     "cut": "study.yaml --out scene.nc",
     "import": "'chip_*.vtu' --set units.length=mm --set interval=1us --out scene.nc",
     "correct": "measured.nc --study study.yaml --out corrected.nc --plot corrected.png",
@@ -151,6 +153,7 @@ def init(
 
 app.command()(run)
 app.command()(error)
+app.command()(band)
 app.command()(cut)
 app.command("import")(import_source)
 app.command()(measure)
