@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final, TypeAlias
 import typer
 
 from chipglow.cli import options as opt
+from chipglow.cli.band import band
 from chipglow.cli.boundary import Boundary
 from chipglow.cli.budget import budget
 from chipglow.cli.camera import calibrate, psf
@@ -209,6 +210,7 @@ COMMANDS: Final[_Commands] = {
     "init": (init, "study.yaml"),
     "run": (run, "study.yaml --out results"),
     "error": (error, "scene.nc --emissivity 0.7 --out results"),
+    "band": (band, "--width 20um --rise 300K --speed 4m/s --camera study.yaml --plot band.png"),
     "cut": (cut, "study.yaml --out scene.nc"),
     "import": (
         import_source,
