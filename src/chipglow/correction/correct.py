@@ -13,6 +13,7 @@ from scipy.special import stdtrit
 
 from chipglow.camera import Camera, Flag, Measurement, check_camera
 from chipglow.camera.image import image_formation
+from chipglow.correction.beyond import Beyond
 from chipglow.correction.cells import CELLS_PER_PIXEL, Parts, cut_cells
 from chipglow.correction.correction import Correction, CorrectionFlag, joined
 from chipglow.correction.noise import noise_of
@@ -57,8 +58,7 @@ _BORDER: Final = 3
 _MARGIN: Final = 4
 """Pixels beyond the image on each side whose radiance is unknown too.
 
-Their light reaches the image; within them the radiance continues as smoothly as in the image, and
-beyond them as that of their edge.
+Their light reaches the image; within them the radiance continues as smoothly as in the image.
 """
 
 _LEVEL: Final = 0.95
@@ -218,6 +218,7 @@ def _corrected(
     if known.outline_uncertainty:
         known, fit, former = _located(image, camera, known, pixels, lambda: progress(0.0))
     problem = _problem(image, camera, known, pixels)
+    problem.beyond = Beyond.of(known.observed, problem.parts, problem.formation)
     posterior = problem.solve(generator, lambda: progress(0.0), former)
     progress(0.5)
     bias = posterior.bias()

@@ -77,6 +77,17 @@ class Curvature:
         return np.maximum(variance, _LEAST_VARIANCE)
 
 
+def slopes_within(parts: Parts) -> Any:
+    """Return the sparse array (difference, part) of differences of neighbours within zones."""
+    pairs = [
+        np.stack([lines[:-1], lines[1:]]).reshape(2, -1)
+        for index in parts.index
+        for lines in (index, index.T)
+    ]
+    members, weights = _known(np.concatenate(pairs, axis=1), (-1.0, 1.0))
+    return _sparse(members, weights, parts.size)
+
+
 def _known(members: NDArray[np.intp], weights: tuple[float, ...]) -> tuple[NDArray[np.intp], Array]:
     """Return the differences whose members all exist, (member, difference), and their weights."""
     members = members.reshape(len(weights), -1)

@@ -378,7 +378,11 @@ class AiryAperture(ApertureChoice):
 @PSFS.part
 @dataclass(frozen=True)
 class MeasuredPSFFile(PSFChoice):
-    """A kernel from a file."""
+    """A kernel from a file.
+
+    It states what the file leaves open: None is for what a .nc file states. `MeasuredPSF` has the
+    values.
+    """
 
     kind = "measured"
     example = "{kind: measured, file: psf.nc}  of chipglow psf; .npy or .csv with spacing: 1 um"
