@@ -341,6 +341,7 @@ def test_the_budget_of_a_plate_is_the_closed_form(plate):
     row = found.summary().iloc[0]
     # The difference over 2 % to both sides is exact to second order: 0.2 % here.
     assert row.error_K == pytest.approx(temperature - 900.0, abs=0.05)
+    # The second order, 0.2 %, and the curvature between.
     assert row.standard_uncertainty_K == pytest.approx(0.02 * 0.6 * slope, rel=0.005)
     assert row.degrees_of_freedom == pytest.approx(9.0, rel=1e-3)
     assert row.validated == "undecided"  # 500 trials are too few for the ends of a Student's t

@@ -276,6 +276,7 @@ def test_measure_writes_frames_at_the_camera_rate(folder, scene):
     (folder / "study.yaml").write_text("camera: {frame_rate: 60 kHz}")
     result = chipglow("measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc")
     measurement = read_measurement("m.nc")
+    # In s: far below an exposure.
     np.testing.assert_allclose(measurement.times, [0.0, 1 / 60e3], atol=1e-12)
     assert measurement.data.attrs["surface"] == "chip 1"
     # The analytic chip goes on beyond the view, bands and all.
