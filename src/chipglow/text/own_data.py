@@ -6,7 +6,7 @@ from typing import Any, Final
 from chipglow.text.memory import MemoryLimitError, check_memory
 
 HDF5_ERRORS: Final = (OSError, ValueError, LookupError, RuntimeError, TypeError, SystemError)
-"""What h5py and xarray raise at a damaged file."""
+"""Errors that h5py and xarray raise for a damaged file."""
 
 _MOST_OBJECTS: Final = 1000
 """Names in the groups of a file that chipglow reads as a whole; its own files have up to 100."""
@@ -42,7 +42,7 @@ def check_own_data(path: Path) -> None:
 def check_bounds(path: Path, by_frame: bool = False) -> None:
     """Refuse an HDF5 file that does not fit into memory, by the sizes that its datasets declare.
 
-    Of a scene, which is read by frame, only one frame counts.
+    A scene is read frame by frame, so only one of its frames counts.
     """
     import h5py
 
