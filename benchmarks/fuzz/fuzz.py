@@ -13,6 +13,7 @@ left. The command fails if a case is not contained. Linux only.
 """
 
 import gc
+import json
 import os
 import re
 import resource
@@ -37,6 +38,11 @@ from common import arguments, print_head, print_row
 PATIENCE, MEMORY, ENOUGH_HANGS, CHUNK = 4, 1024**3, 5, 100
 OUTCOMES = ("read", "refused", "stumbled", "memory", "crash", "hang")
 CHANGES = ("cut", "byte", "word", "number", "repeat", "remove", "splice")
+VALUES = (
+    None, True, -1, 10**400, 1e308, float("nan"), "", "0", "-40,200", "1e999 um", "a" * 10_000, "../x",
+    "\0", "\ud800", [], {}, [[]], {"a": {}}, ["1 um"] * 1000, {"camera.pitch": "1e-23 m"},
+    {"cursor": "1e300,0"}, {"surface.emissivity": "0"}, "change", "draw", "save", "chip", "theme",
+)  # fmt: skip
 NUMBERS = (b"0", b"-1", b"1e308", b"nan", b"inf", b"99999999999", b"4294967295", b"", b"\x00")
 WORDS = (b"\x00" * 8, b"\xff" * 8, b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80", b"\x01\x00\x00\x00")
 NUMBER = re.compile(rb"[0-9][0-9.+\-eE]*")
@@ -69,6 +75,25 @@ def damaged(content, other, random, snippets):
                 start = random.randint(0, len(other))
                 data[part] = other[start : start + part.stop - at]
     return bytes(data)
+
+
+def changed(content, random):
+    """Return a message of the page with other values, of any type, at some of its places."""
+    message = json.loads(content)
+    for _ in range(random.randint(1, 3)):
+        inner = message
+        while True:
+            key = random.choice([*inner])
+            if not isinstance(inner[key], dict) or not inner[key] or random.random() < 0.3:
+                break
+            inner = inner[key]
+        if random.random() < 0.2:
+            del inner[key]
+        else:
+            inner[key] = random.choice(VALUES)
+        if not message or not inner:
+            break
+    return json.dumps(message).encode()
 
 
 def outcome_of(read, alone):
@@ -106,7 +131,10 @@ def fuzz(contents, chunk):
     others, snippets = list(contents.values()), SNIPPETS if name.endswith(".yaml") else ()
     for number in range(first, last):
         random = Random(f"{name} {number}")
-        path.write_bytes(damaged(contents[name], random.choice(others), random, snippets))
+        if name.endswith(".message"):
+            path.write_bytes(changed(contents[name], random))
+        else:
+            path.write_bytes(damaged(contents[name], random.choice(others), random, snippets))
         outcome = outcome_of(target.alone, alone=True)
         counts[outcome] += 1
         if outcome not in ("read", "refused") and counts[outcome] <= 3:

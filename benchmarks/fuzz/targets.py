@@ -18,10 +18,10 @@ from chipglow.io import import_description, import_text, open_scene, write_scene
 from chipglow.io.cameras import read_recording
 from chipglow.io.sandbox import Isolated
 from chipglow.laboratory.recordings import MeasurementDescription, measurement_text
-from chipglow.laboratory.registration import load_registration
+from chipglow.laboratory.registration import Registration, load_registration, write_registration
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, load_study, study_text
-from chipglow.text import load_described
+from chipglow.text import Notes, load_described
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 import camera_files
@@ -63,9 +63,8 @@ def write_targets(folder):
     (folder / "measurement.yaml").write_text(measurement_text(MeasurementDescription()), "utf-8")
     materials = Path(sys.modules["chipglow.cutting"].__file__).parent / "materials" / "workpieces"
     (folder / "material.yaml").write_bytes((materials / "aisi-1045.yaml").read_bytes())
-    (folder / "map.yaml").write_text(
-        "matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\ncovariance: []\nmodel: affine\n"
-    )
+    registration = Registration(np.eye(3), 1e-6 * np.eye(9), "affine", "points", 5.0, Notes())
+    write_registration(registration, folder / "map.yaml")
     times, raster = 1e-6 * np.arange(3), Raster(-4e-6, 4e-6, 1e-6, 8, 8)
     fields = {"temperature": np.full((3, *raster.shape), 700.0)}
     write_scene(Scene.from_fields(raster, times, fields), folder / "own.scene")
@@ -120,14 +119,19 @@ def sample(source):
 @cache
 def page():
     """The page of the app without a browser; what it would send there is left out."""
-    from chipglow.app.opening import open_any
+    from chipglow.app.opening import OpenFiles, open_any
     from chipglow.app.view import PageView
 
-    view = PageView(open_any(None))
+    opened = open_any(None)
+    view = PageView(opened, files=OpenFiles(opened))
     view.page._send_msg = lambda content: None
     return view
 
 
 def send(path):
     """Send a message to the page; text that is no JSON, which no browser sends, is a ValueError."""
-    page()._receive(SimpleNamespace(data=json.loads(path.read_bytes())))
+    message = json.loads(path.read_bytes())
+    content = message.get("content") if isinstance(message, dict) else None
+    if isinstance(content, dict) and isinstance(content.get("data"), str):
+        content["data"] = content["data"].encode()  # JSON has no bytes, the page's messages have
+    page()._receive(SimpleNamespace(data=message))
