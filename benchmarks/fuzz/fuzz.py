@@ -39,8 +39,8 @@ PATIENCE, MEMORY, ENOUGH_HANGS, CHUNK = 4, 1024**3, 5, 100
 OUTCOMES = ("read", "refused", "stumbled", "memory", "crash", "hang")
 CHANGES = ("cut", "byte", "word", "number", "repeat", "remove", "splice")
 VALUES = (
-    None, True, -1, 10**400, 1e308, float("nan"), "", "0", "-40,200", "1e999 um", "a" * 10_000, "../x",
-    "\0", "\ud800", [], {}, [[]], {"a": {}}, ["1 um"] * 1000, {"camera.pitch": "1e-23 m"},
+    None, True, -1, 10**400, 1e308, float("nan"), "", "0", "-40,200", "1e999 um", "a" * 10_000,
+    "../x", "\0", "\ud800", [], {}, [[]], {"a": {}}, ["1 um"] * 1000, {"camera.pitch": "1e-23 m"},
     {"cursor": "1e300,0"}, {"surface.emissivity": "0"}, "change", "draw", "save", "chip", "theme",
 )  # fmt: skip
 NUMBERS = (b"0", b"-1", b"1e308", b"nan", b"inf", b"99999999999", b"4294967295", b"", b"\x00")
