@@ -8,8 +8,9 @@ from scipy.special import erf
 from synthetic_edge import edge_radiance, gaussian_edge, image_of, tailed_edge
 from tolerances import DOUBLE
 
-from chipglow.camera import MeasuredPSF
+from chipglow.camera import Camera, MeasuredPSF
 from chipglow.laboratory.psf import knife_edge, psf_kernel, write_psf
+from chipglow.radiometry import Band
 from chipglow.uncertainty import Cause, Component
 
 FWHM = 10e-6
@@ -58,6 +59,12 @@ def test_the_file_keeps_the_components(gaussian, tmp_path):
     again = MeasuredPSF.from_file(tmp_path / "psf.nc")
     np.testing.assert_allclose(again.weights, psf.weights, rtol=DOUBLE)
     assert again.estimate.names == psf.estimate.names
+    assert again.band == Band(3.8e-6, 5.1e-6)
+    refused = r"band 3\.8 um to 5\.1 um, expected that of the camera, 8 um"
+    with pytest.raises(ValueError, match=refused):
+        Camera(psf=again, band=Band(8e-6, 12e-6))
+    # `in_band` is for those who want the same kernel elsewhere.
+    assert Camera(psf=again).in_band(Band(8e-6, 12e-6)).psf.fwhm == again.fwhm
     assert encircled(again, 5e-6).standard_uncertainty > 1e-4
     away = encircled(again, 5e-6) - encircled(psf, 5e-6)
     assert away.standard_uncertainty == pytest.approx(0.0, abs=DOUBLE)

@@ -30,7 +30,7 @@ from chipglow.correction.sensitivity import (
     systematic_effects,
     texture_effect,
 )
-from chipglow.correction.zones import Motion, ObservedObject, ShapedObject, Zone
+from chipglow.correction.zones import Motion, ObservedObject, ShapedObject, Zone, check_tools
 from chipglow.laboratory.emissivity import reflected_temperature
 from chipglow.quantities import Array
 from chipglow.radiometry import Band
@@ -113,7 +113,8 @@ def correct(
     Raises
     ------
     ValueError
-        If band or pitch differ, no emissivity is known, or a frame has no pixel within the range.
+        If band or pitch differ, a tool is outside the image, no emissivity is known, or a frame
+        has no pixel within the range.
 
     Notes
     -----
@@ -128,6 +129,7 @@ def correct(
     if isinstance(zones, ObservedObject):
         observed = zones
     else:
+        check_tools([zone.shape for zone in zones], measurement.raster)
         observed = ShapedObject(tuple(zones), measurement.raster)
     _check(measurement, camera, observed, psf_uncertainty, outline_uncertainty)
     known = Knowledge(
