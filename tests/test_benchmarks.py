@@ -27,6 +27,10 @@ PROGRAMS = {
         "--scenes 1 --cuts 0 --pixels 20 --processes 1 --rows rows.csv",
         {"rake face": 12, "band": 12, "outline found": 3},
     ),
+    "correction_ranks.py": (
+        "--simulations 3 --pixels 8",
+        {"| middle of the chip": 4, "| rake face": 4},
+    ),
     "app_latency.py": (
         "--turns 1 --controls Seed",
         {"Seed": 5, "all": 4, "opened, with the process": 2, "memory": 1},

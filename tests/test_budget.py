@@ -225,7 +225,7 @@ def test_limits_truncate_the_distribution(distribution, freedoms, peer):
 @pytest.mark.parametrize(
     ("correlations", "message"),
     [
-        ([("a", "b", 0.5)], "a is in the group 'a', b in 'b', expected the same group"),
+        ([("a", "b", 0.5)], "a is in the group 'a', b in 'b'; both must be in the same group"),
         ([("a", "z", 0.5)], "'z' is not a continuous input"),
         ([("c", "e", 0.5)], "'e' is not a continuous input"),
         ([("c", "c", 0.25)], "c with itself, expected two inputs"),

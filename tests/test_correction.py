@@ -217,6 +217,16 @@ def test_the_outline_is_found():
     assert abs(found + off * normal[0]) < 0.05 * PITCH
 
 
+def test_without_an_outline_in_the_image_none_is_moved():
+    pixels = Raster(0.0, 12 * PITCH, PITCH, 12, 12)
+    light = np.full((1, 12, 12), 0.5 * float(BAND.radiance(800.0)))
+    image = Measurement.from_radiance(light, BAND, np.zeros(1), pixels)
+    stated = {"surroundings": DARK, "noise": 0.5, "outline_uncertainty": 3e-6}
+    result = correct(image, CAMERA, [Zone("plate", 0.5)], **stated)
+    assert (result.data["outline_motion"].values == 0).all()
+    assert result.contribution("outline").max() == 0
+
+
 def test_cells_are_cut_exactly():
     pixels = Raster(0.0, 12 * PITCH, PITCH, 12, 12)
     for position, lean in ((0.603, 0.0), (0.55, 0.3)):

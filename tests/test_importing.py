@@ -271,19 +271,23 @@ def test_an_import_that_was_ended_goes_on_to_the_same_file(tmp_path, monkeypatch
             assert np.array_equal(getattr(a, name), getattr(b, name))
 
 
+READY = "import os; os.write(1, (15).to_bytes(8, 'little') + b'[\"ready\", null]'); "
+
+
 @pytest.mark.parametrize(
-    ("program", "code"),
+    ("program", "message"),
     [
-        ("import os; os.close(0); os._exit(3)", 3),
-        ("import os; os.write(1, bytes(8)); os.close(0)", 0),
+        ("import os; os._exit(4)", "ended with code 4"),
+        (f"{READY} os.close(0); os._exit(3)", "ended with code 3"),
+        (f"{READY} os.write(1, bytes(8)); os.close(0)", "gave no answer"),
     ],
-    ids=["no answer", "no pickle"],
+    ids=["no start", "no answer", "other bytes"],
 )
-def test_a_reader_that_does_not_answer_as_it_should_is_one_error(monkeypatch, program, code):
+def test_a_reader_that_does_not_answer_as_it_should_is_one_error(monkeypatch, program, message):
     monkeypatch.setattr("chipglow.io.sandbox._CHILD", ("-c", program))
     # More than a pipe holds.
     source = MovingBlock(tuple("x" * 1_000_000 for _ in range(2)))
-    with pytest.raises(SourceError, match=f"block: its reader ended with code {code}"):
+    with pytest.raises(SourceError, match=f"block: its reader {message}"):
         Isolated(source, "block").survey()
 
 

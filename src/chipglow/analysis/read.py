@@ -101,7 +101,7 @@ def read_place(place: Place, images: Stack, pixels: Raster) -> PlaceReading:
 
 @dataclass(frozen=True)
 class _Rows:
-    """Where the readings and lines of a place on a surface stand in the arrays."""
+    """Positions in the arrays of the readings and lines of a place on a surface."""
 
     view: int
     place: int

@@ -13,6 +13,7 @@ from scipy.special import stdtrit
 
 from chipglow.camera import Camera, Flag, Measurement, check_camera
 from chipglow.camera.image import image_formation
+from chipglow.correction.beyond import Beyond
 from chipglow.correction.cells import CELLS_PER_PIXEL, Parts, cut_cells
 from chipglow.correction.correction import Correction, CorrectionFlag, joined
 from chipglow.correction.noise import noise_of
@@ -46,17 +47,18 @@ of an eighth of a pixel: 1e-4 to 8e-4 of the radiance.
 """
 
 _OUTLINE_ROUNDS: Final = 8
+"""Most rounds in which the outlines move to fit the image."""
+
 _OUTLINE_FOUND: Final = 0.02
 """Motion of the outlines in pixels below which they stay."""
 
 _BORDER: Final = 3
-"""Width in pixels of the border whose values depend on what is beyond the image."""
+"""Width in pixels of the border whose values depend on radiance from beyond the image."""
 
 _MARGIN: Final = 4
 """Pixels beyond the image on each side whose radiance is unknown too.
 
-Their light reaches the image; within them the radiance continues as smoothly as in the image, and
-beyond them as that of their edge.
+Their light reaches the image; within them the radiance continues as smoothly as in the image.
 """
 
 _LEVEL: Final = 0.95
@@ -216,6 +218,7 @@ def _corrected(
     if known.outline_uncertainty:
         known, fit, former = _located(image, camera, known, pixels, lambda: progress(0.0))
     problem = _problem(image, camera, known, pixels)
+    problem.beyond = Beyond.of(known.observed, problem.parts, problem.formation)
     posterior = problem.solve(generator, lambda: progress(0.0), former)
     progress(0.5)
     bias = posterior.bias()

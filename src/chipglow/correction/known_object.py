@@ -32,7 +32,7 @@ A kelvin changes an emissivity of 0.4 by 0.05 % (2e-4 1/K), and this a temperatu
 """
 
 _LEAST: Final = 0.01
-"""Least emissivity of a map: noise must not make it vanish."""
+"""Smallest emissivity of a map: noise must not make it vanish."""
 
 _MARGIN: Final = 2
 """Samples around a map to which its edge extends: outlines may move by as much."""
@@ -125,7 +125,8 @@ def correct_known(
     Raises
     ------
     ValueError
-        See `chipglow.correct`; or if an emissivity is not over 0 to 1 at a zone's temperature.
+        See `chipglow.correct`; also if the emissivity at the temperature of a zone is 0 or less,
+        or above 1.
     """
     pixels = measurement.raster
     lines = [EmissivityLine.constant(1.0) if one.line is None else one.line for one in parts]
@@ -337,7 +338,7 @@ def _centres(raster: Raster) -> tuple[Array, Array]:
 
 
 def _mean(values: Array) -> float:
-    """Return the mean of the known values; 0 without any, as of a zone outside the image."""
+    """Return the mean of the known values; 0 if all are unknown (a zone outside the image)."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else 0.0
 

@@ -14,6 +14,7 @@ from scipy.ndimage import distance_transform_edt
 from scipy.sparse.linalg import splu
 
 from chipglow.camera import ImageFormation
+from chipglow.correction.beyond import Beyond
 from chipglow.correction.cells import CELLS_PER_PIXEL, Parts
 from chipglow.correction.prior import Curvature
 from chipglow.quantities import Array
@@ -97,12 +98,16 @@ class Problem:
     x is the logarithm of the blackbody radiance of each zone at the centres of its cells, C the
     interpolation to the centroids of the parts, a ε the parts' area and emissivity, A the formation
     of the image, D the curvatures within zones. `reflected` is the image of the reflected radiance.
+    A continues the radiance of the edges; with `beyond`, its slopes are continued too.
     """
 
     image: Image
     parts: Parts
     formation: ImageFormation
     reflected: Array
+    beyond: Beyond | None = None
+    excess: Array = field(init=False)
+    """Image of the light that the slopes beyond the edges add, by a former solution."""
     curvature: Curvature = field(init=False)
     weights: Array = field(init=False)
     """Weights w of the curvatures."""
@@ -110,6 +115,7 @@ class Problem:
     """Sparse array Dᵀ w D, (part, part)."""
 
     def __post_init__(self) -> None:
+        self.excess = np.zeros_like(self.reflected)
         self.curvature = Curvature.of(self.parts)
         self._weigh(np.full(self.curvature.part.size, _START_CURVATURE**2))
 
@@ -155,8 +161,14 @@ class Problem:
             squares = (self.curvature.matrix @ posterior.x) ** 2 + uncertain
             measured = ~self.image.missing.ravel()[self.parts.pixel]
             self._weigh(self.curvature.variances(squares, self.parts, measured))
+            self._continue(posterior)
             posterior = self._maximum(posterior.x, check)
         return posterior
+
+    def _continue(self, posterior: "Posterior") -> None:
+        """Set the light from beyond the edges to that of a solution which continues."""
+        if self.beyond is not None:
+            self.excess = self.beyond.excess(posterior.x, posterior.light)
 
     def _start(self) -> Array:
         """Return the solution without blur: each cell has the radiance of its pixel."""
@@ -192,7 +204,7 @@ class Posterior:
         self.sent = problem.shine * problem.radiance(x)
         """Radiance that the parts send, and its change with its logarithm."""
         self.spread = problem.parts.spread(x)
-        self.predicted = self.seen(self.sent) + problem.reflected
+        self.predicted = self.seen(self.sent) + problem.reflected + problem.excess
         self.pixel_weights = problem.image.weights(self.predicted)
         self.prior_weights, self.bending = problem.weights, problem.bending
         sent = sparse.diags_array(self.sent) @ problem.parts.at_centroids

@@ -135,6 +135,7 @@ class AnnularAperturePSF(PointSpreadFunction):
 
     @cached_property
     def fwhm(self) -> float:  # type: ignore[override]
+        # The profile falls below a half between these v, with any obscuration.
         half = scipy.optimize.brentq(lambda v: float(self._profile(np.array(v))) - 0.5, 0.1, 3.0)
         return 2 * float(half) * self._unit
 
@@ -177,7 +178,7 @@ class AnnularAperturePSF(PointSpreadFunction):
         """Radius v that encircles `ANNULAR_ENERGY`."""
         # Beyond the first rings, the fraction outside is 2 / (π v (1 − o)).
         far = 4 / (pi * (1 - self.obscuration) * (1 - ANNULAR_ENERGY))
-        v = np.linspace(0.0, far, ceil(20 * far))
+        v = np.linspace(0.0, far, ceil(20 * far))  # about 60 points per ring of width π
         clear = 1 - self.obscuration**2
         inside = scipy.integrate.cumulative_simpson(
             clear / 2 * self._profile(v) * v, x=v, initial=0.0
@@ -377,7 +378,11 @@ class AiryAperture(ApertureChoice):
 @PSFS.part
 @dataclass(frozen=True)
 class MeasuredPSFFile(PSFChoice):
-    """A kernel from a file."""
+    """A kernel from a file.
+
+    It states what the file leaves open: None is for what a .nc file states. `MeasuredPSF` has the
+    values.
+    """
 
     kind = "measured"
     example = "{kind: measured, file: psf.nc}  of chipglow psf; .npy or .csv with spacing: 1 um"
@@ -446,7 +451,7 @@ def _read_array(path: Path) -> Array:
             return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
     frames = read_matrix(path).values
     if len(frames) > 1:
-        raise ValueError(f"{path}: has {len(frames)} matrices, expected one")
+        raise ValueError(f"{path}: has {len(frames)} matrices, must have 1")
     return np.asarray(frames[0])
 
 

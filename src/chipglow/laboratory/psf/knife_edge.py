@@ -141,6 +141,7 @@ class KnifeEdge:
         """Probability of each model by the Bayesian criterion; all are equal if none fits."""
         if self.unexplained:
             return (1 / len(self.fits),) * len(self.fits)
+        # exp(−350) is small enough for 0, and does not underflow.
         likely = [exp(-min(fit.bic - self.best.bic, 700.0) / 2) for fit in self.fits]
         return tuple(value / sum(likely) for value in likely)
 
@@ -337,6 +338,7 @@ def _edge_warnings(best: ModelFit, k: int, result: EdgeResult) -> Iterator[str]:
     distance = best.edges[k].line.distance(pixels.x, pixels.y)
     core = np.sort(distance[np.abs(distance) < max(best.fwhm, 2 * pixels.pitch)])
     gap = float(np.diff(core).max()) if core.size > 1 else pixels.pitch
+    # 5 % beyond a bin leave the aliasing limit as it is.
     if gap > 1.05 * pixels.pitch / BINS_PER_PITCH:
         yield (
             f"{name}: With a tilt of {degrees(best.edges[k].line.tilt):.2f} deg the pixels lie at "
