@@ -13,6 +13,7 @@ from chipglow.cli.band import band
 from chipglow.cli.boundary import Boundary
 from chipglow.cli.budget import budget
 from chipglow.cli.camera import calibrate, psf
+from chipglow.cli.cameras import cameras
 from chipglow.cli.chip import rake, shearband
 from chipglow.cli.compare import compare
 from chipglow.cli.correct import correct
@@ -52,6 +53,7 @@ EXAMPLES = {
     "show": "measured.nc --plot measured.png",
     "app": "scene.nc",
     "materials": "aisi-1045",
+    "cameras": "flir-a6751",
     "doctor": "",
     "calibrate": "points.csv --band 3.8-5.1um --integration-time 10us --out calibration.yaml",
     "convert": "chip.hcc --set 'pitch=6 um' --set calibration=calibration.yaml --out chip.nc",
@@ -217,6 +219,7 @@ def open_app(
 
 
 app.command()(materials)
+app.command()(cameras)
 
 
 @app.command()
