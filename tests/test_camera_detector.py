@@ -13,12 +13,14 @@ from chipglow import camera as cam
 from chipglow.analysis import error_images, headline
 from chipglow.camera.measuring import measurement_of, read_radiance
 from chipglow.io import write_scene
+from chipglow.quantities import adapter
 from chipglow.report import write_report
 from chipglow.report.answer import answer, changes
 from chipglow.report.facts import Facts
 from chipglow.report.rows import all_rows
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, errors, load_study, study_text
+from chipglow.study.camera_section import CameraSection
 
 SCENE = Raster(-120e-6, 90e-6, 2e-6, 90, 120)
 PLAIN = cam.Camera(psf=None, lower_limit=None)
@@ -374,3 +376,26 @@ def test_the_microbolometers_data_sheet_comes_back():
         camera={"preset": "flir-lepton-3", "magnification": 1.0, "detector": "none"}
     ).camera.build()
     assert ideal.detector is None
+
+
+@pytest.mark.parametrize("temperature", [303.15, 298.15])
+def test_a_netd_alone_is_a_detector_with_that_noise_and_no_other_limit(temperature):
+    short = {"netd": "20 mK"}
+    if temperature != 303.15:
+        short["netd_temperature"] = f"{temperature} K"
+    camera = {"band": "3-5 um", "pitch": "6 um", "detector": short, "lower_limit": "none"}
+    made = Study(camera=camera).camera.build()
+    calibration = made.calibration((60, 80))
+    # Noise of 32 frames of each source is part of the correction: 1.5 %.
+    assert calibration.netd(temperature) == pytest.approx(0.02, rel=0.03)
+    written = adapter(CameraSection).dump_python(Study(camera=camera).camera, mode="json")
+    assert Study(camera=written).camera.build().detector == made.detector
+    explicit = {"response": {"kind": "range", "hottest": "500 degC"}, "bits": 14}
+    ranged = Study(camera={**camera, "detector": {**explicit, **short}}).camera.detector
+    assert (ranged.bits, ranged.response.hottest) == (14, 773.15)
+    assert [term.kind for term in ranged.terms] == ["netd"]
+
+
+def test_a_netd_without_a_unit_is_refused():
+    with pytest.raises(ValueError, match=r"netd: 20 has no unit"):
+        Study(camera={"detector": {"netd": "20"}})

@@ -186,6 +186,7 @@ ENDINGS = {
     ("wavelengths", "--out"): ".csv",
     ("budget", "--out"): ".csv",
     ("design", "--out"): ".csv",
+    ("band", "--out"): ".csv",
     ("register", "--out"): ".yaml or .yml",
     ("register", "--pairs"): ".csv",
     ("register", "--blink"): ".gif",
@@ -203,7 +204,7 @@ QUANTITIES = [
     (name, option.opts[0])
     for name, command in COMMANDS.items()
     for option in command.params
-    if option.metavar in ("TEMPERATURE", "KELVINS", "LENGTH", "TIME")
+    if option.metavar in ("TEMPERATURE", "KELVINS", "LENGTH", "TIME", "SPEED")
 ]
 
 
@@ -213,7 +214,8 @@ def required(name):
         if parameter.required:
             option = parameter.opts[0]
             yield from ((option,) if option.startswith("--") else ())
-            yield {"TEMPERATURE": "300 K"}.get(parameter.metavar, "none.nc")
+            values = {"TEMPERATURE": "300 K", "KELVINS": "300 K", "LENGTH": "20 um"}
+            yield values.get(parameter.metavar, "none.nc")
 
 
 @pytest.mark.parametrize(("command", "option"), FILES)
