@@ -52,6 +52,9 @@ ON_FACE, ON_BAND, AROUND = 0.6, 0.6, 6 * PITCH
 """Views of a cut: up to this part of the feed up the rake face, or of the band; moved by as much.
 """
 
+TRIALS, LEAST_IN_RANGE = 4, 0.2
+"""Draws of a view at most, and the part of its pixels that must be within the range."""
+
 CLEAR_OF_VOID = 2 * PITCH
 """Distance in m from where there is no material at times: motion is not undone."""
 
@@ -215,17 +218,30 @@ def computed_cut(number, end):
 
 
 def of_cut(number, view, pixels):
-    """Return a scene of a cut: an exposure at a random time, beside the edge or on the band."""
+    """Return a scene of a cut: an exposure at a random time, beside the edge or on the band.
+
+    An image that is too cold for its camera is drawn again, at last beside the edge.
+    """
     study, draw = study_of(number), np.random.default_rng([59, number, view])
     stored = StoredScene(cut(study))
+    for trial in range(2 * TRIALS):
+        on_band = view % 2 == 1 and trial < TRIALS
+        one = exposed(stored, study, draw, pixels, on_band)
+        if (one.measurement.flags == 0).mean() >= LEAST_IN_RANGE:
+            break
+    return one
+
+
+def exposed(stored, study, draw, count, on_band):
+    """Return an exposure of a cut of `count` by `count` pixels."""
     duration = CAMERA.integration_time
     start = draw.uniform(stored.times[0], stored.times[-1] - duration)
     instant = Instant.at(stored, start, duration)
-    pixels, samples = rasters_at(view_centre(view, study, stored, instant, draw), pixels, stored)
+    on_band &= instant.band is not None
+    pixels, samples = rasters_at(middle(study, stored, instant, draw, on_band), count, stored)
     x, y = np.meshgrid(samples.x, samples.y)
     in_tool = stored.tool.signed_distance(x, y) < 0
-    lattice = replace(stored.lattice, raster=samples, in_tool=in_tool)
-    near = StoredScene(stored.path, lattice)
+    near = StoredScene(stored.path, replace(stored.lattice, raster=samples, in_tool=in_tool))
     black = CAMERA.expose(near, UniformSurface(1.0), start).mean_radiance.astype(float)
     solid, always = black > 0, material_throughout(near, start, duration)
     netd = drawn_netd(draw)
@@ -248,17 +264,18 @@ def of_cut(number, view, pixels):
 
     conditions = {"speed": study.cutting.speed, "feed": study.cutting.feed, "start": start}
     known = *map(inner, (black, to_tool, solid)), places, normal, width, netd, image
-    return Known("cut", pixels, *known, LOWER_LIMIT, stated, conditions)
+    kind = "shear band" if on_band else "rake face"
+    return Known(kind, pixels, *known, LOWER_LIMIT, stated, conditions)
 
 
-def view_centre(view, study, stored, instant, draw):
+def middle(study, stored, instant, draw, on_band):
     """Return the middle of an image in m."""
-    if view % 2 and instant.band is not None:
+    if on_band:
         points = instant.band.ridge.points
-        middle = points[int(draw.uniform(0, ON_BAND) * len(points))]
+        place = points[int(draw.uniform(0, ON_BAND) * len(points))]
     else:
-        middle = stored.tool.rake_point(draw.uniform(0, ON_FACE) * study.cutting.feed)
-    return middle + draw.uniform(-AROUND, AROUND, 2)
+        place = stored.tool.rake_point(draw.uniform(0, ON_FACE) * study.cutting.feed)
+    return place + draw.uniform(-AROUND, AROUND, 2)
 
 
 def rasters_at(middle, pixels, stored):

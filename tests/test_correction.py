@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from command import refusal
+from command import refusal, typed
 
 from chipglow import AnnularAperturePSF, Band, Camera, Estimate, Measurement, Raster
 from chipglow.camera import Flag, ImageFormation, image_formation
@@ -20,9 +20,9 @@ from chipglow.correction import (
 from chipglow.correction.cells import cut_cells
 from chipglow.correction.posterior import Image, Problem
 from chipglow.correction.zones import Motion, ShapedObject
-from chipglow.io import write_measurement
+from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.emissivity import EmissivityLine
-from chipglow.scene import Polygon, Region
+from chipglow.scene import Polygon, Region, ToolGeometry
 
 PITCH = 6e-6
 SAMPLES = 8
@@ -38,6 +38,10 @@ MORE = 16
 
 EDGE = 0.6
 """Position of the outline between chip and tool, of the width of the image."""
+
+
+AWAY = ToolGeometry(tip=(5e-3, 5e-3))
+OUTSIDE = r"tool: its tip at \(5000, 5000\) um is outside the image, expected .* x 0 to"
 
 
 def half_plane(pixels, position, lean=0.2):
@@ -228,6 +232,16 @@ def test_the_outline_is_found():
     normal = np.array([1.0, -0.2]) / np.hypot(1.0, 0.2)
     found = result.data["outline_motion"][0].values[:2] @ normal
     assert abs(found + off * normal[0]) < 0.05 * PITCH
+
+
+def test_without_an_outline_in_the_image_none_is_moved():
+    pixels = Raster(0.0, 12 * PITCH, PITCH, 12, 12)
+    light = np.full((1, 12, 12), 0.5 * float(BAND.radiance(800.0)))
+    image = Measurement.from_radiance(light, BAND, np.zeros(1), pixels)
+    stated = {"surroundings": DARK, "noise": 0.5, "outline_uncertainty": 3e-6}
+    result = correct(image, CAMERA, [Zone("plate", 0.5)], **stated)
+    assert (result.data["outline_motion"].values == 0).all()
+    assert result.contribution("outline").max() == 0
 
 
 def test_cells_are_cut_exactly():
@@ -444,6 +458,7 @@ def test_a_moved_object_is_looked_up_where_it_came_from():
         ({"camera": CAMERA.in_band(Band(8e-6, 12e-6))}, "3.8 um in the measurement, 8 um in"),
         ({"camera": replace(CAMERA, pitch=5e-6)}, "pitch: 6 um in the measurement, 5"),
         ({"zones": [Zone("plate", None)]}, "no zone has a known emissivity"),
+        ({"zones": [Zone("plate", 0.5), Zone("tool", 0.6, AWAY)]}, OUTSIDE),
         ({"psf_uncertainty": -1.0}, "psf_uncertainty is -1.0"),
         ({"outline_uncertainty": np.nan}, "outline_uncertainty is nan"),
     ],
@@ -482,6 +497,8 @@ def folder(tmp_path, monkeypatch):
     write_measurement(measured(kelvins, emissivity, samples, pixels), tmp_path / "chip.nc")
     kernel = xr.Dataset({"kernel": (("y", "x"), np.ones((3, 3)) / 9, {"spacing": PITCH})})
     kernel.to_netcdf(tmp_path / "psf.nc", engine="h5netcdf")
+    kernel["kernel"].attrs |= {"band_lower": 8e-6, "band_upper": 12e-6}
+    kernel.to_netcdf(tmp_path / "long-wave.nc", engine="h5netcdf")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -495,6 +512,12 @@ def folder(tmp_path, monkeypatch):
         ("--psf psf.nc --emissivity 1.7", "emissivity: is 1.7, expected more than 0 to 1"),
         ("--psf psf.nc --emissivity e.nc", "e.nc: there is no such file"),
         ("--psf none.nc --emissivity 0.7", "none.nc: there is no such file"),
+        ("--psf psf.nc --emissivity 0", "emissivity: is 0.0, expected more than 0 to 1"),
+        (
+            "--psf long-wave.nc --emissivity 0.7",
+            "long-wave.nc: psf: was measured in the band 8 um to 12 um, expected that of the "
+            "camera, 3.8 um to 5.1 um",
+        ),
     ],
 )
 def test_the_command_refuses_in_one_line(folder, options, message):
@@ -506,4 +529,16 @@ def test_the_command_refuses_a_tool_outside_the_image(folder):
     text = "tip: [5 mm, 5 mm]\nrake_angle: 0 deg\nclearance_angle: 7 deg\n"
     (folder / "tool.yaml").write_text(text, "utf-8")
     message = refusal("correct chip.nc --psf psf.nc --emissivity 0.42 --tool tool.yaml")
-    assert "--tool: tool.yaml is outside the image of x 0 to 72 um and y 0 to 72 um" in message
+    assert "tool: its tip at (5000, 5000) um is outside the image" in message
+    assert "expected a tool that reaches x 0 to 72 um and y 0 to 72 um" in message
+    own = read_measurement(folder / "chip.nc").with_tool(AWAY)
+    write_measurement(own, folder / "own.nc")
+    message = refusal("correct own.nc --psf psf.nc --emissivity 0.42")
+    assert "tool: its tip at (5000, 5000) um is outside the image" in message
+
+
+def test_a_point_spread_function_without_a_band_is_assumed_to_fit(folder):
+    output = typed("correct chip.nc --psf psf.nc --emissivity 0.42").output
+    assert "psf.nc states no band: it was measured in that of the image." in " ".join(
+        output.split()
+    )

@@ -13,6 +13,7 @@ from test_io import a_file
 
 from chipglow.camera import Camera
 from chipglow.io import open_scene, read_measurement
+from chipglow.io.cameras import read_recording
 from chipglow.scene import Raster
 from chipglow.study import Study, check_cost
 from chipglow.text import MemoryLimitError, check_bounds, check_memory, parse_yaml
@@ -72,16 +73,49 @@ def test_the_limit_is_the_memory_available_unless_stated(monkeypatch):
         check_memory("a number", 8.0)
 
 
-def test_very_many_variables_deep_groups_and_references_are_refused(tmp_path):
+@pytest.mark.parametrize("kind", ["groups", "links", "levels"])
+def test_very_many_groups_links_and_levels_are_refused(kind, tmp_path):
     with h5py.File(tmp_path / "many.nc", "w") as file:
-        for number in range(10_001):
-            file.create_group(f"g{number}")
+        group = file
+        for number in range(1001):
+            if kind == "links":
+                file[f"g{number}"] = file  # one object by many names
+            else:
+                made = group.create_group(f"g{number}")
+                group = made if kind == "levels" else file
+    with pytest.raises(MemoryLimitError, match="has over 1000 groups and variables"):
+        check_bounds(tmp_path / "many.nc")
+
+
+def test_references_are_refused(tmp_path):
     with h5py.File(tmp_path / "references.nc", "w") as file:
         file["temperature"] = np.zeros((2, 3, 4), np.float32)
         file["time"] = np.array([file["temperature"].ref] * 2, h5py.ref_dtype)
     refused(["show", tmp_path / "references.nc"], "'time' has values of another kind")
-    with pytest.raises(ValueError, match="has over 10000 groups and variables"):
-        open_scene(tmp_path / "many.nc")
+
+
+@posix
+def test_special_files_are_refused_by_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("study.yaml", "chip.nc"):
+        os.mkfifo(name)
+    (tmp_path / "store.zarr").mkdir()
+    os.mkfifo("store.zarr/zarr.json")
+    (tmp_path / "own.yaml").write_text("scene: chip.nc")
+    for command in (
+        "run study.yaml --out new", "run own.yaml --out new", "show chip.nc", "rake chip.nc",
+        "import store.zarr --out new.nc", "app chip.nc --no-browser", "psf study.yaml",
+        "convert chip.* --out new.nc", "sweep study.yaml --vary seed=1,2 --out new",
+    ):  # fmt: skip
+        refused(command.split(), "is a pipe, expected a regular file")
+    for command in ("show /dev/zero", "error /dev/null --out new", "materials /dev/null"):
+        refused(command.split(), "is a device, expected a regular file")
+    with pytest.raises(ValueError, match=r"chip\.nc: is a pipe"):
+        open_scene("chip.nc")
+    with pytest.raises(ValueError, match=r"chip\.nc: is a pipe"):
+        read_measurement("chip.nc")
+    with pytest.raises(ValueError, match=r"chip\.nc: is a pipe"):
+        read_recording("chip.nc")
 
 
 # The last bytes are the digest, the splines or fields, and the metadata of HDF5.

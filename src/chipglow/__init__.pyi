@@ -91,9 +91,16 @@ from .laboratory.registration import (
 )
 from .radiometry import Band as Band, RatioThermometer as RatioThermometer
 from .report import write_report as write_report
-from .scene import Raster as Raster, Scene as Scene, ToolGeometry as ToolGeometry, areas as areas
+from .scene import (
+    Raster as Raster,
+    Scene as Scene,
+    ToolGeometry as ToolGeometry,
+    areas as areas,
+    scenes as scenes,
+)
 from .study import (
     Study as Study,
+    band_reading as band_reading,
     cut as cut,
     design as design,
     load_study as load_study,

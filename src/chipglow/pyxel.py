@@ -94,7 +94,7 @@ def photons(
     begin = first + detector.time - detector.time_step
     exposure = camera.expose(scene, surface, begin)
     image = camera.form_image(exposure.mean_radiance, scene.raster)
-    element = 1e-12 * detector.geometry.pixel_vert_size * detector.geometry.pixel_horz_size
+    element = 1e-12 * detector.geometry.pixel_vert_size * detector.geometry.pixel_horz_size  # m²
     collected = transmittance * pi / (4 * f_number**2) * element * detector.time_step
     detector.photon.array = image * collected * _central_wavelength(camera.band) / (h * c)
 

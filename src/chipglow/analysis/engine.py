@@ -271,7 +271,7 @@ def analyse(
     attribution : AttributionPlan, optional
         Effects among which the errors of the shown exposure are divided; None: they are not.
     correction : CorrectionPlan, optional
-        What is known if the shown exposure of a cut is corrected beside the cutting edge; None: it
+        Knowledge for correcting the shown exposure of a cut near the cutting edge; None: it
         is not corrected.
 
     Returns
@@ -344,7 +344,7 @@ def schedule_of(
 
 
 def _schedule(task: _Task) -> tuple[Schedule, Cut | None, tuple[str, ...]]:
-    """Return the schedule with the cut, if the scene shows one, or with what it lacks."""
+    """Return the schedule, the cut if the scene shows one, and the missing parts if not."""
     cut, missing = _find_cut(task)
     return _scene_schedule(task) if cut is None else _cut_schedule(task, cut), cut, missing
 

@@ -29,7 +29,7 @@ from chipglow.camera.reference import (
     still_radiance,
     true_kind,
 )
-from chipglow.quantities import Array
+from chipglow.quantities import Array, unchecked
 from chipglow.scene import Raster, Scene, sample
 from chipglow.surface import EmissivityField, ModifiedSurface, Surface, UniformSurface
 
@@ -46,7 +46,7 @@ _Coalition = frozenset[str]
 
 
 class PixelReading(NamedTuple):
-    """What a camera reads: temperatures in K and flags as those of a measurement, each (y, x)."""
+    """Reading of a camera: temperatures in K and flags of a measurement, each (y, x)."""
 
     temperature: Array
     flags: NDArray[np.uint8]
@@ -194,7 +194,7 @@ class Stages:
 
 @dataclass(frozen=True, eq=False)
 class ExposedChain:
-    """What a camera reads of one exposure with some of its effects switched on.
+    """Readings of a camera in one exposure, with some of its effects switched on.
 
     Effects are members of `Effect`; the kind of a term, such as ``veil`` or ``shot-noise``, names
     one of the terms of `Effect.OPTICS` or `Effect.DETECTOR`. Switched off, an effect is ideal:
@@ -224,7 +224,7 @@ class ExposedChain:
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """Effects that are there, in the order of the light."""
+        """Effects that are present, in the order of the light."""
         camera, detector = self.camera, self.camera.detector
         absent = {
             Effect.REFLECTION: not self.reflects,
@@ -244,7 +244,9 @@ class ExposedChain:
 
     def reference(self, kind: ReferenceKind | None = None) -> Array:
         """Return the temperature in K of pixels without error; NaN where nothing radiates."""
-        pixels_alone = replace(self.camera, psf=None, psf_order="optics", optics=(), detector=None)
+        pixels_alone = unchecked(
+            self.camera, psf=None, psf_order="optics", optics=(), detector=None
+        )
         return self.stages.reference(pixels_alone, kind=kind or self.reference_kind)
 
     def radiance(self, on: Collection[str] = EVERY) -> Array:
@@ -281,7 +283,10 @@ class ExposedChain:
 
     def stack(self, effects: Mapping[str, Collection[str]]) -> Array:
         """Return the reference, then the readings with each set of effects, (row, y, x)."""
-        return np.stack([self.reference(), *(self.reading(on) for on in effects.values())])
+        reference = self.reference()
+        is_dark = np.isnan(reference)
+        readings = (self.read(on).temperature for on in effects.values())
+        return np.stack([reference, *(np.where(is_dark, np.nan, one) for one in readings)])
 
     def waterfall(self, order: Sequence[Collection[str]]) -> Array:
         """Return the change of the reading in K by each set of effects in turn, (set, y, x).
@@ -317,7 +322,7 @@ class ExposedChain:
         return self.terms_of(Effect.OPTICS) | self.terms_of(Effect.DETECTOR)
 
     def _without_detector(self, on: _Coalition) -> Camera:
-        return replace(self._switched(on), detector=None)
+        return unchecked(self._switched(on), detector=None)
 
     def _switched(self, on: _Coalition) -> Camera:
         """Return the camera with the parts and terms that act."""
@@ -328,7 +333,8 @@ class ExposedChain:
             if Effect.DIGITISER not in on:
                 detector = detector.undigitised() if terms else None
         psf = camera.psf if Effect.PSF in on else None
-        return replace(
+        # Parts of a camera that is possible are checked; a check takes longer than a small image.
+        return unchecked(
             camera,
             psf=psf,
             # Without a PSF its order does not matter; one value lets cameras share the image.
@@ -410,7 +416,7 @@ def _formed(
     is_common = blurred is not None and name == "seen" and moves and has_footprint
     if is_common and psf and camera.psf_order == "optics" and "footprint" not in psf.includes:
         assert blurred is not None
-        radiance, camera = blurred(psf), replace(camera, psf=None)
+        radiance, camera = blurred(psf), unchecked(camera, psf=None)
     image = form_image(camera, radiance, exposure.raster, gather)
     if beyond is None:
         return image
@@ -418,7 +424,7 @@ def _formed(
 
 
 def _read(formed: Callable[..., Array], start: float, camera: Camera, *how: object) -> PixelReading:
-    undetected = replace(camera, detector=None) if camera.detector else camera
+    undetected = unchecked(camera, detector=None) if camera.detector else camera
     return read_temperature(camera, formed(undetected, *how), start)
 
 

@@ -11,20 +11,20 @@ from typer.core import TyperGroup
 from chipglow.cli import options as opt, screen, streams
 
 BAD_INPUT: Final = 2
-"""Exit status after invalid input, as of Click."""
+"""Exit status after invalid input; Click uses the same."""
 
 FAILED: Final = 1
 """Exit status after a failure."""
 
 INTERRUPTED: Final = 130
-"""Exit status after Ctrl-C, as of shells: 128 and the number of the signal."""
+"""Exit status after Ctrl-C. Shells use the same: 128 plus the number of the signal."""
 
 _LONGEST_MESSAGE: Final = 2000
 """Characters of an error that are shown; a longer one quotes a value of the input."""
 
 _NO_THREAD: Final = "can't start new thread"
 _NO_ROOM: Final = "failed to map segment"
-"""What the system says of a library for which a limit of memory leaves no room."""
+"""Message of the system if a limit of memory leaves no room for a library."""
 
 _FEWER: Final = "end other programs, raise the limit (ulimit -u), or set OMP_NUM_THREADS=1"
 _SMALLER: Final = "choose fewer or coarser samples, or end other programs"

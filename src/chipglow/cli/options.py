@@ -43,6 +43,7 @@ kelvins = partial(_quantity_option, "KELVINS", "TEMPERATURE_DIFFERENCE")
 length = partial(_quantity_option, "LENGTH", "LENGTH")
 time = partial(_quantity_option, "TIME", "INSTANT")
 duration = partial(_quantity_option, "TIME", "TIME")
+speed = partial(_quantity_option, "SPEED", "SPEED")
 
 
 def flag(name: str, text: str) -> Any:

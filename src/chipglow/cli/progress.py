@@ -23,6 +23,9 @@ from chipglow.study import (
 )
 from chipglow.text import Notes
 
+_LONG: Final = 90.0
+"""Seconds above which a time is stated in minutes."""
+
 _MARGIN: Final = 4
 """Columns that a bar leaves free."""
 
@@ -51,7 +54,7 @@ def confirm_cost(study: Study, resume: bool, agreed: bool) -> None:
     say_checkpoint("cut", kept, resume)
     cost = expected_cost(study)
     seconds = (1 - kept if resume else 1.0) * cost.seconds
-    time = f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
+    time = f"{seconds / 60:.0f} min" if seconds > _LONG else f"{seconds:.0f} s"
     console.print(
         f"Expected: about {time}, {cost.disk / 1e9:.2g} GB in the cache, {cost.memory / 1e9:.2g} "
         "GB of memory."

@@ -27,7 +27,7 @@ _FEW_POINTS: Final = 4
 """Points along the side of the cells at which outlines are searched."""
 
 _LEAST_AREA: Final = 2e-3
-"""Least fraction of a cell of a part: a smaller one sends less light than the model's error."""
+"""Smallest fraction of a cell for a part: a smaller one emits less than the model's error."""
 
 _ORDERS: Final = (3, 0), (2, 1), (1, 2), (0, 3), (4, 0), (2, 2), (0, 4)
 """Powers of the places to the right and down in the moments of third and fourth order."""

@@ -30,7 +30,7 @@ from chipglow.correction.sensitivity import (
     systematic_effects,
     texture_effect,
 )
-from chipglow.correction.zones import Motion, ObservedObject, ShapedObject, Zone
+from chipglow.correction.zones import Motion, ObservedObject, ShapedObject, Zone, check_tools
 from chipglow.laboratory.emissivity import reflected_temperature
 from chipglow.quantities import Array
 from chipglow.radiometry import Band
@@ -47,11 +47,13 @@ of a twenty-fourth of a pixel: up to 3e-4 of the radiance.
 """
 
 _OUTLINE_ROUNDS: Final = 8
+"""Most rounds in which the outlines move to fit the image."""
+
 _OUTLINE_FOUND: Final = 0.02
 """Motion of the outlines in pixels below which they stay."""
 
 _BORDER: Final = 3
-"""Width in pixels of the border whose values depend on what is beyond the image."""
+"""Width in pixels of the border whose values depend on radiance from beyond the image."""
 
 _MARGIN: Final = 4
 """Pixels beyond the image on each side whose radiance is unknown too.
@@ -111,7 +113,8 @@ def correct(
     Raises
     ------
     ValueError
-        If band or pitch differ, no emissivity is known, or a frame has no pixel within the range.
+        If band or pitch differ, a tool is outside the image, no emissivity is known, or a frame
+        has no pixel within the range.
 
     Notes
     -----
@@ -126,6 +129,7 @@ def correct(
     if isinstance(zones, ObservedObject):
         observed = zones
     else:
+        check_tools([zone.shape for zone in zones], measurement.raster)
         observed = ShapedObject(tuple(zones), measurement.raster)
     _check(measurement, camera, observed, psf_uncertainty, outline_uncertainty)
     known = Knowledge(

@@ -25,7 +25,7 @@ _LEAST_VARIANCE: Final = 1e-12
 
 
 _LEAST_WEIGHT: Final = 1e-3
-"""Least weight of a local mean, that of a value about six cells away."""
+"""Smallest weight of a local mean: the weight of a value about six cells away."""
 
 
 @dataclass(frozen=True, eq=False)

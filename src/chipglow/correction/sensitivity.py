@@ -53,7 +53,7 @@ _PSF_DRAWS: Final = 6
 """Draws of the point spread function within its uncertainty."""
 
 _LEAST_DATA: Final = 1e-4
-"""Least number of data for a part: below it, a detail would be larger than 100 cells."""
+"""Smallest number of data for a part: below it, a detail would be larger than 100 cells."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,7 +258,8 @@ def fit_outline(posterior: Posterior, known: Knowledge) -> OutlineFit:
     slope -= responses @ gradient + stated / known.outline_uncertainty**2
     covariance = np.linalg.inv(information)
     motion = covariance @ slope
-    motion *= min(1.0, known.outline_uncertainty / float(np.abs(motion).max()))
+    # Without an outline in the image, the motion is zero.
+    motion *= known.outline_uncertainty / max(np.abs(motion).max(), known.outline_uncertainty)
     covariance += np.eye(3) * (_OUTLINE_ERROR * posterior.problem.parts.pixels.spacing) ** 2
     spread = np.sqrt(np.diag(covariance)) * scale
     root = np.asarray(np.linalg.cholesky((covariance + covariance.T) / 2), np.float64)

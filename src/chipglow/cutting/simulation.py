@@ -70,7 +70,7 @@ from chipglow.cutting.recording import (
     restore,
 )
 from chipglow.cutting.steady_tool import SteadyTool, ToolBody, beyond, steady_temperature
-from chipglow.quantities import Brief
+from chipglow.quantities import ROUNDING, Brief
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.splines import Lattice
 from chipglow.scene.tool_surface import ToolSurface, surface_distances
@@ -343,7 +343,7 @@ class CuttingSimulation(CutSettings):
 
     def _recorder(self, window: OutputWindow) -> Recorder:
         length = self.conditions.cutting_length
-        if window.end > length * (1 + 1e-9):
+        if window.end > length * (1 + ROUNDING):
             raise ValueError(
                 f"window end: {window.end * 1e3:g} mm is beyond the cutting length of "
                 f"{length * 1e3:g} mm"
@@ -359,7 +359,7 @@ class CuttingSimulation(CutSettings):
     @property
     def overview_raster(self) -> Raster:
         """Samples of a quarter of a cell over the computed region."""
-        grid, samples = _grid(self.numerics), 4
+        grid, samples = _grid(self.numerics), 4  # per side of a cell
         leaving = 2  # cells at the right and at the top, through which the material leaves
         left = grid.left + _MARGIN_CELLS * grid.cell
         top = grid.bottom + (grid.rows - 1 - _MARGIN_CELLS - leaving) * grid.cell
@@ -373,7 +373,7 @@ class CuttingSimulation(CutSettings):
         """Return the nodes whose splines the frames are; the raster must be simulated."""
         grid = _grid(self.numerics)
         left, right, bottom, top = raster.extent
-        edge = 3 * grid.cell
+        edge = 3 * grid.cell  # more than the 1.5 cells that a spline reaches
         inside = (
             left >= grid.left + edge
             and bottom >= grid.bottom + edge
@@ -548,6 +548,7 @@ class _State:
         heights = np.linspace(0.0, conditions.feed, 64)  # of the face, finer than the cells
         self.face = _touching(self.tool, heights)
         self.columns = 0
+        # Four cells and four columns are spare.
         travel = conditions.cutting_length + 4 * numerics.cell
         capacity = int((self.face - self.entry + travel) / self.spacing + 4) * self.rows.size
         self.points = np.zeros(capacity, POINT)
@@ -736,7 +737,7 @@ def _time_steps(
     material, numerics = simulation.workpiece, simulation.numerics
     drift = min(
         _MAX_DRIFT * numerics.cell / simulation.conditions.speed,
-        _MAX_FASTEST_DRIFT * numerics.cell / max(fastest, 1e-9),
+        _MAX_FASTEST_DRIFT * numerics.cell / max(fastest, 1e-9),  # at rest in m/s
     )
     tool, temperature = simulation.tool_material, simulation.conditions.initial_temperature
     diffusivity = max(

@@ -1,3 +1,4 @@
+from . import scenes as scenes
 from .frame import (
     FIELD_UNITS as FIELD_UNITS,
     FILLED as FILLED,

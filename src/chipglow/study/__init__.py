@@ -1,5 +1,6 @@
 """Studies: settings of cut, camera and analysis, as a YAML file or in Python."""
 
+from chipglow.study.band import BandReading as BandReading, band_reading as band_reading
 from chipglow.study.budgets import StudyBudget as StudyBudget, study_budget as study_budget
 from chipglow.study.cache import (
     CachedScene as CachedScene,

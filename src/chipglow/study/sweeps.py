@@ -45,6 +45,9 @@ MOST_POINTS: Final = 100_000
 """Points of a sweep: each is a file in one folder, and a study in memory."""
 
 _POINTS: Final = "points"
+_SCRATCH: Final = "workers"
+"""Folder of the worker processes in that of a sweep, while they run."""
+
 _RANGE: Final = re.compile(r"([^:]+):([^:]+)(?::(\d{1,18}))?")
 _QUANTITY: Final = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
@@ -261,7 +264,7 @@ def sweep(
             for key, one in zip(keys, studies, strict=True)
             if not _is_done(path := point_file(folder, key))
         }
-        _compute(list(tasks.values()), client, workers, tell)
+        _compute(list(tasks.values()), client, workers, tell, folder.resolve() / _SCRATCH)
     return Sweep._stated(folder, text)
 
 
@@ -277,12 +280,13 @@ def _compute(
     client: Client | None,
     workers: int | None,
     tell: Progress,
+    scratch: Path,
 ) -> None:
     """Compute the scenes of points that are not in the cache, then the points."""
     new = [one for one, *_ in tasks if isinstance(one, Study) and one.scene is None]
     scenes = {json.dumps(scene_inputs(one)): one for one in new}
     cuts = [(one,) for one in scenes.values() if not is_cut(one)]
-    with local_client(client, workers, max(len(tasks), len(cuts))) as computing:
+    with local_client(client, workers, max(len(tasks), len(cuts)), scratch) as computing:
         for step, function, arguments in (("cuts", _cut, cuts), ("points", compute_point, tasks)):
             for count, _ in enumerate(on_client(computing, function, arguments), 1):
                 tell(step, count / len(arguments))

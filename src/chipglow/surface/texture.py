@@ -42,6 +42,7 @@ class Emissivity(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        # Only values of 0 and 1 reach (m (1 − m))^(1/2); a beta distribution stays below it.
         most = 0.9 * sqrt(self.mean * (1.0 - self.mean))
         if self.standard_deviation > most:
             raise ValueError(

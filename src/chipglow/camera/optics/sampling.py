@@ -45,6 +45,8 @@ def overlap_lengths(left: Array, width: float, samples: int, spacing: float) -> 
     return np.where(end - begin > _ROUNDING * min(width, spacing), end - begin, 0.0)
 
 
+# Kept because a raster checks its numbers, and one image asks for its pixels six times.
+@lru_cache(maxsize=64)
 def sensor_raster(
     scene: Raster, pitch: float, offset: tuple[float, float], shape: tuple[int, int] | None
 ) -> Raster:

@@ -49,8 +49,12 @@ MESH_READERS: Final[Mapping[str, Callable[[Sequence[Path]], MeshReader]]] = {
 
 _VECTOR: Final = "velocity"
 _COMPONENTS: Final = ("velocity_x", "velocity_y")
+
 _VECTOR_SIZES: Final = (2, 3)
+"""Numbers of components of vectors."""
+
 _COMPOUND_SIZES: Final = (*_VECTOR_SIZES, 6, 9)
+"""Numbers of components of vectors, symmetric tensors and tensors."""
 
 _MOST_PARTS: Final = 1000
 """Most parts of a mesh."""

@@ -61,8 +61,11 @@ Pixel = tuple[float, float]
 _LEGEND_MARGIN: Final = 3
 """Pixels around a legend that are left out with it."""
 
+_LIKE_TOOL: Final = 16
+"""Difference from the tool's colour in 8 bits up to which a colour is the tool, not background."""
+
 _NOISE_OF_YUV: Final = 1.0
-"""Least noise in CIE L*a*b* of colours that are stored as 8 bits of luminance and chrominance.
+"""Smallest noise in CIE L*a*b* of colours stored as 8 bits of luminance and chrominance.
 
 It is the median error of ramps in `viridis` and `jet` as MJPEG and H.264 of good quality. Within a
 uniform area it is the same everywhere, and so cannot be seen there.
@@ -409,7 +412,7 @@ class MovieSource(PlacedSource, Part):
         if self.tool_colour is not None:
             tool = np.array(self.tool_colour)
             found, values = (
-                tuple(colour for colour in colours if np.abs(tool - colour).max() > 16)
+                tuple(colour for colour in colours if np.abs(tool - colour).max() > _LIKE_TOOL)
                 for colours in (found, values)
             )
         # Pixels at the cold end of the scale may be background; hotter ones are not.
