@@ -34,6 +34,18 @@ def problem_of(light, pixels, zones):
     return Problem(image, parts, formation, np.zeros(pixels.shape))
 
 
+def raw_moments(mean):
+    """Return the moments 0 to 4 about the middle of a cell of light with a mean place."""
+    square = 1 / 12 + mean**2
+    return 1, mean, square, 3 * mean / 12 + mean**3, 1 / 80 + mean**2 / 2 + mean**4
+
+
+def mirrored(number, count):
+    if number < 0:
+        return -1 - number
+    return number if number < count else 2 * count - 1 - number
+
+
 class DenseChip:
     """The model of a chip beside a tool as dense matrices, in plain loops.
 
@@ -69,25 +81,26 @@ class DenseChip:
     def spread(self, x):
         """Return where cells with the logarithms x of their radiance send their light from.
 
-        The light of a cell with the slope s has its centroid s/12 from the middle, and the variance
-        1/12 about it; so have weights on the cell and its neighbours.
+        The light of a cell with the slope s has its centroid s/12 from the middle, about it the
+        variance 1/12 and the fourth moment 1/80; so have weights on the 13 cells up to two steps
+        away. Beyond the border is the mirror image.
         """
         rows, columns = self.cells.shape
         matrix = sparse.dok_array((x.size, x.size))
         values = x.reshape(self.cells.shape)
+        steps = [at for at in np.ndindex(5, 5) if abs(at[0] - 2) + abs(at[1] - 2) <= 2]
+        powers = [at for at in np.ndindex(5, 5) if sum(at) <= 3] + [(4, 0), (2, 2), (0, 4)]
+        system = [[(d - 2.0) ** n * (r - 2.0) ** m for d, r in steps] for n, m in powers]
+        weights_of = linalg.inv(system)
         for row, column in np.ndindex(rows, columns):
-            weights = []
-            for step in ((1, 0), (0, 1)):
-                slope = self.slope(values, row, column, *step)
-                square = 1 / 12 + (slope / 12) ** 2
-                weights.append(((square - slope / 12) / 2, 1 - square, (square + slope / 12) / 2))
-            for down, right in np.ndindex(3, 3):
-                to = (
-                    min(max(row + down - 1, 0), rows - 1),
-                    min(max(column + right - 1, 0), columns - 1),
-                )
-                share = weights[0][down] * weights[1][right]
-                matrix[to[0] * columns + to[1], row * columns + column] += share
+            down, right = (
+                raw_moments(self.slope(values, row, column, *step) / 12)
+                for step in ((1, 0), (0, 1))
+            )
+            weights = weights_of @ [down[n] * right[m] for n, m in powers]
+            for (d, r), weight in zip(steps, weights, strict=True):
+                to = mirrored(row + d - 2, rows), mirrored(column + r - 2, columns)
+                matrix[to[0] * columns + to[1], row * columns + column] += weight
         return matrix.tocsc()
 
     def slope(self, values, row, column, down, right):
