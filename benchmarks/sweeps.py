@@ -36,14 +36,14 @@ def main():
         run_client(*given.client)
         return
     print_head("workers", "time / s", "ideal / s", "overhead / %")
-    for workers in (1, 2):
-        with local_client(None, workers, given.tasks) as client:
-            run_all(client, workers * 4)
-            _, wall, _ = timed(partial(run_all, client, given.tasks))
-        ideal = DURATION * given.tasks / workers
-        over = f"{100 * (wall / ideal - 1):.1f}"
-        print_row(str(workers), f"{wall:.2f}", f"{ideal:.2f}", over)
     with tempfile.TemporaryDirectory() as folder:
+        for workers in (1, 2):
+            with local_client(None, workers, given.tasks, Path(folder) / "workers") as client:
+                run_all(client, workers * 4)
+                _, wall, _ = timed(partial(run_all, client, given.tasks))
+            ideal = DURATION * given.tasks / workers
+            over = f"{100 * (wall / ideal - 1):.1f}"
+            print_row(str(workers), f"{wall:.2f}", f"{ideal:.2f}", over)
         kill_at_random(Path(folder), given.points, given.kills)
 
 

@@ -162,11 +162,6 @@ def chip_analysis():
         AnalyticChip(frames=60).scene(),
         {"chip 1": CHIP_1, "chip 2": CHIP_2},
         Camera.paper(),
-        Plan(
-            exposures=3,
-            phases=2,
-            textures=3,
-            psf_widths=(4e-6, 12e-6, 20e-6),
-            attribution=AttributionPlan(),
-        ),
+        Plan(exposures=3, phases=2, textures=3, psf_widths=(4e-6, 12e-6, 20e-6)),
+        attribution=AttributionPlan(),
     )

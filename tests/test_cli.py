@@ -16,7 +16,6 @@ from undrawn import leave_undrawn
 
 from chipglow.camera import Camera, Measurement
 from chipglow.cli import app
-from chipglow.cli.app import EXAMPLES
 from chipglow.cutting import CuttingSimulation, SolverError
 from chipglow.io import atomic_folder, open_scene, read_measurement, write_scene
 from chipglow.io.digest import is_intact
@@ -279,6 +278,7 @@ def test_measure_writes_frames_at_the_camera_rate(folder, scene):
     (folder / "study.yaml").write_text("camera: {frame_rate: 60 kHz}")
     result = chipglow("measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc")
     measurement = read_measurement("m.nc")
+    # In s: far below an exposure.
     np.testing.assert_allclose(measurement.times, [0.0, 1 / 60e3], atol=1e-12)
     assert measurement.data.attrs["surface"] == "chip 1"
     # The analytic chip goes on beyond the view, bands and all.
@@ -383,11 +383,18 @@ def test_a_run_that_is_ended_from_outside_leaves_nothing(folder, tmp_path):
     assert list((tmp_path / "cache").iterdir()) == []
 
 
+COMMANDS = typer.main.get_command(app).commands
+EXAMPLES = {
+    name: one.epilog.removeprefix(f"Example: chipglow {name}")
+    for name, one in COMMANDS.items()
+    if name != "cache"
+}
+
+
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_the_help_of_a_command_ends_with_an_example_that_is_understood(name, tmp_path, monkeypatch):
-    command = typer.main.get_command(app).commands[name]
-    assert command.epilog == f"Example: chipglow {name} {EXAMPLES[name]}"
-    arguments = shlex.split(EXAMPLES[name])
+    command, arguments = COMMANDS[name], shlex.split(EXAMPLES[name])
+    assert command.epilog.startswith(f"Example: chipglow {name} ")
     monkeypatch.chdir(tmp_path)
     for word in arguments:
         if Path(word).suffix and not Path(word).exists() and "=" not in word:

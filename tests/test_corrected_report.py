@@ -92,6 +92,7 @@ def test_the_true_temperature_is_that_of_the_mean_radiance(scene, analysis):
     radiance = [band.radiance(scene.field("temperature", frame)[own]) for frame in frames]
     # Radiance is tabulated to 1e-4 of itself, which is 0.02 K.
     expected = float(band.temperature(np.mean(radiance)))
+    # Twice in the mean and its inverse, and rounded.
     assert window.true[row, column] == pytest.approx(expected, abs=0.05)
 
 
@@ -106,9 +107,9 @@ def test_stated_uncertainties_come_before_those_of_the_heated_chip(analysis):
         "surface.chips.chip 2.body.mean": {"standard": 0.03},
         "camera.psf.numerical_aperture": {"standard": "2 %"},
     }
-    plan = Study(uncertainty={"inputs": stated}).plan.correction
+    plan = Study(uncertainty={"inputs": stated}).known
     assert plan == CorrectionPlan({"chip 2": 0.03}, pytest.approx(0.02))
-    assert Study(correction=False).plan.correction is None
+    assert Study(correction=False).known is None
 
 
 PLACE = SimpleNamespace(

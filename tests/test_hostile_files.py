@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from collections import namedtuple
 
 import h5py
 import numpy as np
@@ -10,8 +11,12 @@ import pytest
 from command import refused
 from test_io import a_file
 
+from chipglow.camera import Camera
 from chipglow.io import open_scene, read_measurement
-from chipglow.text import MemoryLimitError, check_bounds, check_memory
+from chipglow.io.cameras import read_recording
+from chipglow.scene import Raster
+from chipglow.study import Study, check_cost
+from chipglow.text import MemoryLimitError, check_bounds, check_memory, parse_yaml
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX")
 
@@ -68,16 +73,49 @@ def test_the_limit_is_the_memory_available_unless_stated(monkeypatch):
         check_memory("a number", 8.0)
 
 
-def test_very_many_variables_deep_groups_and_references_are_refused(tmp_path):
+@pytest.mark.parametrize("kind", ["groups", "links", "levels"])
+def test_very_many_groups_links_and_levels_are_refused(kind, tmp_path):
     with h5py.File(tmp_path / "many.nc", "w") as file:
-        for number in range(10_001):
-            file.create_group(f"g{number}")
+        group = file
+        for number in range(1001):
+            if kind == "links":
+                file[f"g{number}"] = file  # one object by many names
+            else:
+                made = group.create_group(f"g{number}")
+                group = made if kind == "levels" else file
+    with pytest.raises(MemoryLimitError, match="has over 1000 groups and variables"):
+        check_bounds(tmp_path / "many.nc")
+
+
+def test_references_are_refused(tmp_path):
     with h5py.File(tmp_path / "references.nc", "w") as file:
         file["temperature"] = np.zeros((2, 3, 4), np.float32)
         file["time"] = np.array([file["temperature"].ref] * 2, h5py.ref_dtype)
     refused(["show", tmp_path / "references.nc"], "'time' has values of another kind")
-    with pytest.raises(ValueError, match="has over 10000 groups and variables"):
-        open_scene(tmp_path / "many.nc")
+
+
+@posix
+def test_special_files_are_refused_by_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("study.yaml", "chip.nc"):
+        os.mkfifo(name)
+    (tmp_path / "store.zarr").mkdir()
+    os.mkfifo("store.zarr/zarr.json")
+    (tmp_path / "own.yaml").write_text("scene: chip.nc")
+    for command in (
+        "run study.yaml --out new", "run own.yaml --out new", "show chip.nc", "rake chip.nc",
+        "import store.zarr --out new.nc", "app chip.nc --no-browser", "psf study.yaml",
+        "convert chip.* --out new.nc", "sweep study.yaml --vary seed=1,2 --out new",
+    ):  # fmt: skip
+        refused(command.split(), "is a pipe, expected a regular file")
+    for command in ("show /dev/zero", "error /dev/null --out new", "materials /dev/null"):
+        refused(command.split(), "is a device, expected a regular file")
+    with pytest.raises(ValueError, match=r"chip\.nc: is a pipe"):
+        open_scene("chip.nc")
+    with pytest.raises(ValueError, match=r"chip\.nc: is a pipe"):
+        read_measurement("chip.nc")
+    with pytest.raises(ValueError, match=r"chip\.nc: is a pipe"):
+        read_recording("chip.nc")
 
 
 # The last bytes are the digest, the splines or fields, and the metadata of HDF5.
@@ -146,6 +184,7 @@ def test_a_loop_of_links_is_refused_by_name(tmp_path, monkeypatch, command):
         (MemoryError("Unable to allocate 298. GiB"), "not enough memory: Unable to allocate 298"),
         (MemoryError(), "not enough memory; choose fewer or coarser samples"),
         (RuntimeError("can't start new thread"), "the system starts no more threads"),
+        (ImportError("_dop.so: failed to map segment from shared object"), "not enough memory to"),
     ],
 )
 def test_a_lack_of_memory_or_threads_is_one_line_with_a_hint(tmp_path, monkeypatch, error, text):
@@ -154,3 +193,117 @@ def test_a_lack_of_memory_or_threads_is_one_line_with_a_hint(tmp_path, monkeypat
 
     monkeypatch.setattr("chipglow.study.study_text", fails)
     refused(["init", tmp_path / "study.yaml"], text, code=1)
+
+
+DOUBLED = "a0: &a0 [x, x]\n" + "".join(
+    f"a{level}: &a{level} [*a{level - 1}, *a{level - 1}]\n" for level in range(1, 40)
+)
+MERGED = "a0: &a0 {x: 1}\n" + "".join(
+    f"a{level}: &a{level} {{<<: [*a{level - 1}, *a{level - 1}]}}\n" for level in range(1, 40)
+)
+HOSTILE_YAML = {
+    "doubled": (DOUBLED, "has over 10000 keys and values"),
+    "merged": (MERGED, "has over 10000 keys and values"),
+    "itself": ("camera: &a {pitch: *a}", "line 1, column 20: contains itself"),
+    "merged with itself": ("camera: &a {<<: *a}", "contains itself"),
+    "deep": ("[" * 100_000, "has over 50 levels of sections"),
+    "keys": ("\n".join(f"k{number}: 1" for number in range(80_000)), "has over 10000 keys"),
+    "points": (f"analysis: {{points: [{'1, ' * 100_000}]}}", "has over 10000 keys"),
+    "digits": (f"seed: {'9' * 400}", "line 1, column 7: the number is too large"),
+    "tag": ('seed: !!int ""', "a value does not fit its tag"),
+    "half a character": ('title: "\\uD800"', "has half a character"),
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE_YAML)
+def test_hostile_yaml_is_one_line(kind, tmp_path):
+    text, message = HOSTILE_YAML[kind]
+    path = tmp_path / "study.yaml"
+    path.write_text(text, encoding="utf-8")
+    refused(["run", path, "--out", tmp_path / "out"], "study.yaml", message)
+
+
+def test_an_error_quotes_no_pages_of_the_input(tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text(f"seed: [{'1, ' * 9000}]", encoding="utf-8")
+    output = refused(["run", path, "--out", tmp_path / "out"], "seed: [1, 1", "a whole number")
+    assert len(output) < 3000  # the longest message is of 2000 characters
+
+
+def test_aliases_that_expand_to_little_are_read():
+    parsed = parse_yaml("a: &a {x: 1, z: 3}\nb: &b {<<: *a, y: 2}\nc: {<<: [*b, *a], x: 4}\n")
+    assert parsed["c"] == {"x": 4, "y": 2, "z": 3}
+    assert parsed["b"] == {"x": 1, "y": 2, "z": 3}
+
+
+# One study a limit: declared, and compared with this machine before the cut.
+TOO_MUCH = {
+    "camera: {pitch: 1e-23 m}": "camera.pitch: 1e-17 um, expected 0.01 um to 10000 um",
+    "camera: {pitch: 0.01 um}": "camera.pitch: 0.01 um: needs about ",
+    "cutting: {field_of_view: {spacing: 1e-20 m}}": "spacing: 1e-14 um, expected 0.000001 um",
+    "cutting: {field_of_view: {rows: 99999, columns: 99999}}": "field_of_view.spacing: 2/3 um: ",
+    "cutting: {field_of_view: {rows: 1000000000000}}": "rows: 1e+12, expected 1 to 100000",
+    "cutting: {numerics: {cell: 0.5 um}, cutting_length: 90 mm}": "cutting.numerics.cell: 0.5 um: ",
+    "analysis: {exposures: 1000000000000}": "analysis.exposures: 1e+12, expected 1 to 10000",
+}
+
+
+@pytest.mark.parametrize("study", TOO_MUCH)
+def test_a_study_that_asks_for_more_than_the_machine_has_names_its_setting(
+    study, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("CHIPGLOW_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("CHIPGLOW_MEMORY", "64 GB")
+    path = tmp_path / "study.yaml"
+    path.write_text(study)
+    # No terminal is asked, and --yes agrees to a long cut only.
+    refused(["run", path, "--out", tmp_path / "out", "--yes"], TOO_MUCH[study])
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_memory_of_a_study_is_that_of_the_limit(monkeypatch, tmp_path):
+    monkeypatch.setenv("CHIPGLOW_CACHE", str(tmp_path))
+    monkeypatch.setenv("CHIPGLOW_MEMORY", "2 GB")
+    check_cost(Study())  # 1.6 GB
+    monkeypatch.setenv("CHIPGLOW_MEMORY", "1 GB")
+    with pytest.raises(MemoryLimitError, match=r"cutting\.field_of_view\.spacing: .*1\.6"):
+        check_cost(Study())
+
+
+def test_a_scene_that_does_not_fit_the_disk_names_the_interval(monkeypatch, tmp_path):
+    monkeypatch.setenv("CHIPGLOW_CACHE", str(tmp_path / "not" / "there"))
+    usage = namedtuple("usage", "free")
+    monkeypatch.setattr("chipglow.study.cost.disk_usage", lambda _: usage(1e6))
+    with pytest.raises(ValueError, match=r"cutting\.window\.interval: 0\.2 us: .* 0\.001 GB left"):
+        check_cost(Study())
+
+
+def test_the_pixels_of_a_scene_are_compared_with_the_memory(monkeypatch):
+    monkeypatch.setenv("CHIPGLOW_MEMORY", "1 GB")
+    raster = Raster(0.0, 1e-3, 1e-6, 1000, 1000)
+    with pytest.raises(MemoryLimitError, match=r"camera\.pitch: 0\.1 um makes 1e\+08 pixels"):
+        Camera(pitch=1e-7).pixels(raster)
+
+
+@pytest.mark.parametrize("vary", ["1um:2um:999999999999", ",".join(["1um"] * 400)])
+def test_a_sweep_of_too_many_points_is_refused(vary, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.yaml").write_text("{}")
+    options = [f"--vary=camera.{name}={vary}" for name in ("pitch", "psf.fwhm")]
+    refused(["sweep", "study.yaml", *options, "--out", "sweep"], "expected")
+    assert not (tmp_path / "sweep").exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [
+        (OverflowError("int too large to convert to float"), "a number is too large: int"),
+        (RecursionError("maximum depth"), "the input is nested too deeply"),
+    ],
+)
+def test_what_no_limit_foresaw_is_one_line(error, text, tmp_path, monkeypatch):
+    def fails(*_):
+        raise error
+
+    monkeypatch.setattr("chipglow.study.study_text", fails)
+    refused(["init", tmp_path / "study.yaml"], text)

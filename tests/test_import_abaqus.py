@@ -103,7 +103,7 @@ REFUSED = {
     r"\*ELSET: the set hard is not defined before": MESH + "*ELSET, ELSET=all\nhard\n",
     r"\*INSTANCE: an instance that is rotated": PART
     + assembly(CHIP + "0., 0., 0.\n0., 0., 0., 0., 0., 1., 90.\n"),
-    r"CHIP-1, CHIP-2 have elements .* expected one": PART
+    r"CHIP-1, CHIP-2 have elements .* only one part": PART
     + assembly(CHIP, CHIP.replace("p-1", "p-2")),
     r"\*INSTANCE: PART= is not a part": assembly("NAME=Chip-1, LIBRARY=old\n"),
     r"CHIP, B have elements": PART + PART.replace("Chip", "B"),
@@ -145,7 +145,7 @@ def test_elements_without_an_area_are_counted_and_their_rows_ignored(tmp_path):
     assert survey.notes.remarks == [
         "Elements without an area are skipped: 1 CONN2D2, 1 DASHPOTA, 1 MASS, 1 R2D2, 1 ROTARYI, "
         "1 SPRINGA.",
-        "Positions are those of the input file: its tables have no U1 and no COOR1.",
+        "Positions are taken from the input file: its tables have no U1 and no COOR1.",
     ]
     assert survey.temperatures == (300.0, 400.0)
 

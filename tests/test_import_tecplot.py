@@ -222,7 +222,7 @@ def damaged_zone(**changed):
         ([damaged_zone(shape=(70, 2**31 - 1))], "2147483647 numbers"),
         ([damaged_zone(shape=(-1, 54))], "-1 points"),
         ([damaged_zone(cells=quads() + 20)], "nodes 21 to 90"),
-        ([damaged_zone(columns=[("shared", 0)] * 4)], "shares with zone 1, expected one before"),
+        ([damaged_zone(columns=[("shared", 0)] * 4)], "shares with zone 1, which is not before it"),
         ([zone_of(), damaged_zone(columns=[("shared", 0)] * 4, shape=(71, 54))], "shares 70"),
         ([zone_of(), damaged_zone(cells=0, kind="triangles")], "elements of another kind"),
         ([damaged_zone(columns=["passive"] * 4)], "there is no X"),

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from moving_block import RATE, SPEED, UP, Broken, MovingBlock, strain_at
+from tolerances import SINGLE
 
 from chipglow.io import open_scene, unfinished_scenes
 from chipglow.io.completion import Completion, complete, optical_flow, strain_rate_along
@@ -47,7 +48,7 @@ def test_a_whole_source_comes_through_as_it_is(tmp_path):
     frame = scene.frame(5)
     solid = frame.material == Material.WORKPIECE
     x, y = np.meshgrid(RASTER.x, RASTER.y)
-    assert frame.temperature[solid] == pytest.approx((400 + 1e6 * x + 5e5 * y)[solid], rel=1e-6)
+    assert frame.temperature[solid] == pytest.approx((400 + 1e6 * x + 5e5 * y)[solid], rel=SINGLE)
     assert frame.plastic_strain[solid] == pytest.approx(strain_at(x, y, 5e-6)[solid], rel=1e-4)
     assert (frame.temperature[~solid] == np.float32(293.15)).all()
     assert (frame.plastic_strain[~solid] == 0).all()
@@ -271,19 +272,23 @@ def test_an_import_that_was_ended_goes_on_to_the_same_file(tmp_path, monkeypatch
             assert np.array_equal(getattr(a, name), getattr(b, name))
 
 
+READY = "import os; os.write(1, (15).to_bytes(8, 'little') + b'[\"ready\", null]'); "
+
+
 @pytest.mark.parametrize(
-    ("program", "code"),
+    ("program", "message"),
     [
-        ("import os; os.close(0); os._exit(3)", 3),
-        ("import os; os.write(1, bytes(8)); os.close(0)", 0),
+        ("import os; os._exit(4)", "ended with code 4"),
+        (f"{READY} os.close(0); os._exit(3)", "ended with code 3"),
+        (f"{READY} os.write(1, bytes(8)); os.close(0)", "gave no answer"),
     ],
-    ids=["no answer", "no pickle"],
+    ids=["no start", "no answer", "other bytes"],
 )
-def test_a_reader_that_does_not_answer_as_it_should_is_one_error(monkeypatch, program, code):
+def test_a_reader_that_does_not_answer_as_it_should_is_one_error(monkeypatch, program, message):
     monkeypatch.setattr("chipglow.io.sandbox._CHILD", ("-c", program))
     # More than a pipe holds.
     source = MovingBlock(tuple("x" * 1_000_000 for _ in range(2)))
-    with pytest.raises(SourceError, match=f"block: its reader ended with code {code}"):
+    with pytest.raises(SourceError, match=f"block: its reader {message}"):
         Isolated(source, "block").survey()
 
 

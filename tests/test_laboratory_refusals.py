@@ -310,8 +310,9 @@ COMMANDS = {
     f"{COMPARE} --curve curve.csv --out .": "holds the input",
     "psf edge.nc --model lorentz": "'lorentz' was not fitted",
     "psf edge.nc --set 'band=3-5 um'": "--set",
-    "psf edge.nc --region 5:35": "expected rows and columns such as 10:70,20:90",
-    "psf edge.nc --region 0:4,0:4": "edge.nc: the region has 4 x 4 pixels",
+    "psf edge.nc --region 5:35": "expected columns and rows such as 20:90,10:70",
+    "psf edge.nc --region 5,0:35": "expected columns and rows such as 20:90,10:70",
+    "psf edge.nc --region 0:4,0:5": "edge.nc: the region has 5 x 4 pixels",
     "psf flat.nc": "flat.nc: no edge stands out of the noise",
     "register chip.nc empty.png --points points.csv": "empty.png: is empty, expected a picture",
     "register chip.nc text.png --points points.csv": "text.png: expected a picture",
@@ -324,8 +325,9 @@ COMMANDS = {
     f"{REGISTER} --dots --points points.csv": "expected one of --points FILE, --dots and",
     f"{REGISTER} --map m.yaml --points points.csv": "expected one of --points FILE, --dots and",
     f"{REGISTER} --dots": "infrared image: 0 dots are found, expected a",
-    f"{REGISTER} --dots --align '1 um, 2 um'": "'1 um, 2 um', expected left, bottom, right, top",
-    f"{REGISTER} --dots --align '9 um, 0 um, 1 um, 5 um'": "left must be less than right",
+    f"{REGISTER} --dots --align '1um,2um'": "'1um,2um', expected x and y such as -90um:-10um,20um",
+    f"{REGISTER} --dots --align 9um:1um,0um:5um": "expected ranges from the smaller to the larger",
+    f"{REGISTER} --dots --align 0:9,0:5": "expected x and y such as -90um:-10um,20um:120um",
     f"{REGISTER} --pairs p.csv": "--pairs requires --align",
 }
 

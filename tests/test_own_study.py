@@ -2,7 +2,6 @@
 
 import re
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -276,7 +275,7 @@ def test_a_true_temperature_as_reference_states_which(tmp_path):
 def test_a_camera_by_name_has_its_data_sheets_numbers_and_says_where_they_stand():
     study = Study(camera={"preset": "flir-lepton-3", "magnification": 0.5, "frame_rate": "9 Hz"})
     camera = study.camera.build()
-    assert (camera.band, camera.pitch) == (Band(8e-6, 14e-6), pytest.approx(24e-6, rel=1e-12))
+    assert (camera.band, camera.pitch) == (Band(8e-6, 14e-6), pytest.approx(24e-6))
     assert (study.camera.array, camera.frame_rate) == ((160, 120), 9.0)
     # NA = m / (2 N (1 + m)) of a lens that is focused at infinity.
     assert camera.psf.numerical_aperture == pytest.approx(0.5 / (2 * 1.1 * 1.5), rel=1e-12)
@@ -355,7 +354,7 @@ def test_what_the_analysis_takes_from_the_paper_is_said():
     told = " ".join(left_to_the_paper(study))
     assert "of analysis: rake_chip chip 2, band_chip chip 1, reference maximum." in told
     assert "PSF widths from 1.38 um to 6.89 um" in told
-    assert replace(Study().plan, attribution=None, correction=None) == Study().analysis
+    assert Study().plan == Study().analysis
     at_a_point = Study(
         camera={"pitch": "5 um"}, analysis={"points": {"here": ("0 um", "0 um")}, "exposures": 1}
     )

@@ -254,7 +254,7 @@ def test_a_visible_picture_is_upright(tmp_path, suffix, orientation):
     assert frame.sum() < 300
 
 
-ALIGN = "--align '60 um, 30 um, 120 um, 90 um' --pairs pairs.csv"
+ALIGN = "--align '60um:120um,30um:90um' --pairs pairs.csv"
 
 
 def offset_of(result):

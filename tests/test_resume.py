@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -143,10 +144,18 @@ def progress_of_all(study):
             continue
 
 
+def use_own_kernels(folder, monkeypatch):
+    """Copy compiled kernels: what another process compiles now can differ in the last bits."""
+    compiled = os.environ.get("NUMBA_CACHE_DIR")
+    if compiled is not None:
+        unfinished = shutil.ignore_patterns("*.tmp.*")
+        shutil.copytree(compiled, folder, ignore=unfinished, dirs_exist_ok=True)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
+
+
 @pytest.mark.slow
 def test_a_cut_that_is_killed_again_and_again_ends_with_the_same_bits(cache, tmp_path, monkeypatch):
-    # Kernels that another process compiles at the same time can differ in the last bits.
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    use_own_kernels(tmp_path / "kernels", monkeypatch)
     monkeypatch.setenv("CHIPGLOW_CACHE", str(tmp_path / "unbroken"))
     with start() as process:
         _, errors = process.communicate(timeout=300)

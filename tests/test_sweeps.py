@@ -3,6 +3,8 @@
 import json
 import os
 import signal
+import subprocess
+import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -184,13 +186,16 @@ def test_a_damaged_description_is_named(grid, tmp_path, content):
         Sweep.open(tmp_path)
 
 
-def test_workers_that_die_while_they_start_are_one_line(monkeypatch):
+def test_workers_that_die_while_they_start_are_one_line(monkeypatch, tmp_path):
     def dies(*arguments, **options):
         raise RuntimeError("Nanny failed to start.")
 
     monkeypatch.setattr("distributed.LocalCluster", dies)
     match = r"did not start .*; the computed points are kept"
-    with pytest.raises(ConnectionError, match=match), local_client(None, 2, 2):
+    with (
+        pytest.raises(ConnectionError, match=match),
+        local_client(None, 2, 2, tmp_path / "workers"),
+    ):
         pass
 
 
@@ -268,7 +273,7 @@ def write_once(folder, number, lethal):
 
 def test_a_killed_worker_costs_its_task_alone(tmp_path):
     function = partial(write_once, tmp_path)
-    with local_client(None, 2, 40) as client:
+    with local_client(None, 2, 40, tmp_path / "workers") as client:
         done = sum(1 for _ in on_client(client, function, [(n, (7, 23)) for n in range(40)]))
     assert done == 40
     times = [len(list(tmp_path.glob(f"{number}-*"))) for number in range(40)]
@@ -277,9 +282,60 @@ def test_a_killed_worker_costs_its_task_alone(tmp_path):
     assert sum(times) <= 40 + 2
 
 
-def test_a_cluster_without_workers_ends_the_sweep(monkeypatch):
+SWEEPING = """
+import ctypes, sys, os
+from pathlib import Path
+from chipglow.study.workers import local_client, on_client
+
+def hold(folder, number):  # a computation that lets no other thread of its process run
+    (folder / f"pid-{os.getpid()}").touch()
+    ctypes.PyDLL(None).sleep(600)
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1])
+    with local_client(None, 2, 2, folder / "workers") as client:
+        list(on_client(client, hold, [(folder, 0), (folder, 1)]))
+"""
+
+
+def alive(pid):
+    """Whether a process runs; one that has ended but was not waited for does not."""
+    try:
+        return "Z" not in Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel ends the workers on Linux")
+def test_workers_end_with_a_killed_sweep_and_the_next_removes_their_files(tmp_path):
+    script = tmp_path / "sweeping.py"
+    script.write_text(SWEEPING)
+    own = {**os.environ, "TMPDIR": str(tmp_path / "tmp")}
+    (tmp_path / "tmp").mkdir()
+    with subprocess.Popen([sys.executable, script, tmp_path], env=own) as process:
+        try:
+            until = time.monotonic() + 300  # the workers import for long on a busy machine
+            while len(pids := [path.name[4:] for path in tmp_path.glob("pid-*")]) < 2:
+                assert time.monotonic() < until
+                assert process.poll() is None
+                time.sleep(0.2)
+        finally:
+            process.kill()
+    until = time.monotonic() + 60  # the kernel signals them at once
+    while any(map(alive, pids)):
+        assert time.monotonic() < until
+        time.sleep(0.2)
+    assert not list((tmp_path / "tmp").glob("dask*"))
+    assert any((tmp_path / "workers").iterdir())
+    with local_client(None, 1, 1, tmp_path / "workers") as client:
+        assert list(on_client(client, time.sleep, [(0.0,)])) == [None]
+    assert not (tmp_path / "workers").exists()
+
+
+def test_a_cluster_without_workers_ends_the_sweep(monkeypatch, tmp_path):
     monkeypatch.setattr("chipglow.study.workers._SILENCE", 0.5)
-    with local_client(None, 1, 1) as client:
+    with local_client(None, 1, 1, tmp_path / "workers") as client:
         client.cluster.scale(0)
         client.cluster.sync(client.cluster._correct_state)
         with pytest.raises(ConnectionError, match="every worker of the cluster is lost"):

@@ -44,7 +44,9 @@ def length(standard, difference, expansion, away, of_expansion, of_temperature):
 def test_h1_the_end_gauge():
     inputs = end_gauge()
     found = length(*inputs)
+    # Half of the last printed digit. So below, unless stated.
     assert found.values == pytest.approx(50.000838, abs=5e-7)
+    # Half of the last printed digit.
     assert inputs[1].standard_uncertainty / NM == pytest.approx(9.7, abs=0.05)
     # Printed from the rounded 9.7 nm: 25.6; 25.4 without rounding.
     assert inputs[1].degrees_of_freedom == pytest.approx(25.6, abs=0.2)
@@ -58,12 +60,16 @@ def test_h1_the_end_gauge():
     ):
         # The difference of temperatures is printed from the rounded 0.029 °C: 16.7.
         assert found.contribution(name) / NM == pytest.approx(expected, abs=0.1)
+    # Half of the last printed digit.
     assert found.standard_uncertainty / NM == pytest.approx(32, abs=0.5)
-    assert found.degrees_of_freedom == pytest.approx(16.7, abs=0.3)
-    # H.1.6: t for 99 % and 16 degrees of freedom is 2.92, and U 93 nm.
+    # Printed from rounded uncertainties: 16.75 without rounding.
+    assert found.degrees_of_freedom == pytest.approx(16.7, abs=0.1)
+    # H.1.6: t for 99 % and 16 degrees of freedom is 2.92.
     assert np.floor(found.degrees_of_freedom) == 16
+    # U is 93 nm; half of the last printed digit.
     assert stdtrit(16, 0.995) * found.standard_uncertainty / NM == pytest.approx(93, abs=0.5)
-    assert found.coverage_factor(0.99) == pytest.approx(2.92, abs=0.03)
+    # 16.75 degrees of freedom give 0.015 less; 0.005 is the rounding of the printed number.
+    assert found.coverage_factor(0.99) == pytest.approx(2.92, abs=0.02)
 
 
 VOLTS = [5.007, 4.994, 5.005, 4.990, 4.999]
@@ -89,13 +95,17 @@ def test_h2_resistance_and_reactance():
         observed.standard_uncertainty, [0.0032, 0.0095e-3, 0.00075], rtol=0.016
     )
     among = observed.correlation()
+    # Half of the last printed digit.
     assert among[[0, 0, 1], [1, 2, 2]] == pytest.approx([-0.36, 0.86, -0.65], abs=0.005)
     # Table H.3
     found = impedance([observed[0], observed[1], observed[2]])
+    # Half of the last printed digit.
     np.testing.assert_allclose(found.values, [127.732, 219.847, 254.260], atol=5e-4)
+    # Half of the last printed digit; but 0.29558 is printed as 0.295.
     np.testing.assert_allclose(found.standard_uncertainty, [0.071, 0.295, 0.236], atol=6e-4)
     among = found.correlation()
-    assert among[[0, 0, 1], [1, 2, 2]] == pytest.approx([-0.588, -0.485, 0.993], abs=6e-4)
+    # Half of the last printed digit.
+    assert among[[0, 0, 1], [1, 2, 2]] == pytest.approx([-0.588, -0.485, 0.993], abs=5e-4)
     np.testing.assert_allclose(found.degrees_of_freedom, 4.0)
 
 
@@ -126,15 +136,21 @@ def test_h3_calibration_of_a_thermometer():
         "scatter about the line", scatter, per_element=True, degrees_of_freedom=9
     )
     line = observed.linear(solve)
-    np.testing.assert_allclose(line.values, [-0.1712, 0.00218], atol=(5e-5))
+    # Half of the last printed digit of the first.
+    np.testing.assert_allclose(line.values, [-0.1712, 0.00218], atol=5e-5)
     # Half of the last printed digit.
     assert line.values[1] == pytest.approx(0.00218, abs=5e-6)
+    # Half of the last printed digit.
     assert line.standard_uncertainty[0] == pytest.approx(0.0029, abs=5e-5)
+    # Half of the last printed digit.
     assert line.standard_uncertainty[1] == pytest.approx(0.00067, abs=5e-6)
+    # Half of the last printed digit.
     assert line.correlation()[0, 1] == pytest.approx(-0.930, abs=5e-4)
     # H.3.4: the correction at 30 °C, 0.0041 with nine degrees of freedom.
     at_30 = line[0] + line[1] * 10.0
+    # Half of the last printed digit.
     assert at_30.values == pytest.approx(-0.1494, abs=5e-5)
+    # Half of the last printed digit.
     assert at_30.standard_uncertainty == pytest.approx(0.0041, abs=5e-5)
     assert at_30.degrees_of_freedom == pytest.approx(9.0)
 
@@ -159,9 +175,10 @@ ESTIMATES = st.builds(
 @settings(max_examples=50)
 def test_what_is_equal_has_no_difference(one):
     for difference in (one - one, one + one - 2 * one, one / one, one[::-1] - one[[3, 2, 1, 0]]):
-        np.testing.assert_allclose(difference.standard_uncertainty, 0.0, atol=1e-9)
+        # Of values up to 100.
+        np.testing.assert_allclose(difference.standard_uncertainty, 0.0, atol=100 * DOUBLE)
     total = one[0] + one[1] + one[2] + one[3] - one.sum()
-    assert total.standard_uncertainty == pytest.approx(0.0, abs=1e-9)
+    assert total.standard_uncertainty == pytest.approx(0.0, abs=100 * DOUBLE)
 
 
 @given(ESTIMATES, st.integers(0, 1000))
@@ -265,7 +282,7 @@ def test_parts_of_a_component_share_its_degrees_of_freedom():
     assert (one.only("random") - one).standard_uncertainty == 0.0
     back = from_xarray(to_xarray(one.reshape(1), "t"), "t")
     assert back.names == one.names
-    assert (back - one).standard_uncertainty == pytest.approx(0.0, abs=1e-12)
+    assert (back - one).standard_uncertainty == 0.0
 
 
 # Derivatives
@@ -278,9 +295,9 @@ def test_derivatives_of_any_function():
         np.power, one, two,
         derivatives=[lambda x, p: p * x ** (p - 1), lambda x, p: x**p * np.log(x)],
     )  # fmt: skip
-    # Slopes over one standard uncertainty err by its square, 1e-7.
     found = propagate(np.power, one, two)
-    np.testing.assert_allclose(found.covariance(), analytic.covariance(), rtol=1e-5)
+    # Slopes over one standard uncertainty err by its square, 1e-7.
+    np.testing.assert_allclose(found.covariance(), analytic.covariance(), rtol=1e-6)
     unknown = propagate(np.add, Estimate([1.0, np.nan]), two)
     np.testing.assert_array_equal(unknown.values, [4.0, np.nan])
 
@@ -314,17 +331,21 @@ def half_width(drawn):
 
 def test_draws_have_their_distribution():
     (drawn,) = draw([exact(0.0, "cause", 1.0)], 200_000, np.random.default_rng(2))
-    assert drawn.std() == pytest.approx(1.0, rel=0.01)
+    # Five standard deviations, each 1/√(2 · 200 000) = 0.16 %.
+    assert drawn.std() == pytest.approx(1.0, rel=0.008)
     # The ends of 200 000 draws are known to about 0.005.
     assert half_width(drawn) == pytest.approx(1.95996, abs=0.02)
     one = exact(0.0, "cause", 1.0, 5)
     (drawn,) = draw([one], 200_000, np.random.default_rng(2))
-    assert half_width(drawn) == pytest.approx(float(one.coverage_factor()), rel=0.02)
+    # Five standard deviations: of both ends, √(0.025 · 0.975 / 200 000 / 2) over the density at
+    # the end is 0.3 % of it.
+    assert half_width(drawn) == pytest.approx(float(one.coverage_factor()), rel=0.016)
 
 
 def test_draws_of_infinite_variance_are_made_if_asked_for():
     one = exact(0.0, "cause", 1.0, 2)
     (drawn,) = draw([one], 200_000, np.random.default_rng(2), heavy_tails=True)
+    # Six standard deviations, each 0.5 % with two degrees of freedom.
     assert half_width(drawn) == pytest.approx(float(one.coverage_factor()), rel=0.03)
 
 
@@ -346,7 +367,7 @@ def test_files_keep_all(tmp_path_factory, one, square):
     one = one.reshape(2, 2) if square else one
     found = read_back(one, tmp_path_factory.mktemp("file"))
     np.testing.assert_array_equal(found.values, one.values)
-    np.testing.assert_allclose((found - one).standard_uncertainty, 0.0, atol=1e-12)
+    np.testing.assert_array_equal((found - one).standard_uncertainty, 0.0)
     np.testing.assert_allclose(found.degrees_of_freedom, one.degrees_of_freedom)
     assert (found.warnings, found.unevaluated) == (one.warnings, one.unevaluated)
     assert [part.cause for part in found.components] == [part.cause for part in one.components]

@@ -31,7 +31,6 @@ from .camera import (
     BlurredPSF as BlurredPSF,
     Camera as Camera,
     Chain as Chain,
-    ChipglowWarning as ChipglowWarning,
     Detector as Detector,
     Effect as Effect,
     EnergyResponse as EnergyResponse,

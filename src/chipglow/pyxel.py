@@ -27,7 +27,7 @@ from chipglow.surface import Surface
 
 
 @dataclass(frozen=True)
-class PhotonResponse:
+class PerPhotonResponse:
     """A band's response to photons instead of energy: R(λ) λ / λ₀."""
 
     band: Band
@@ -94,7 +94,7 @@ def photons(
     begin = first + detector.time - detector.time_step
     exposure = camera.expose(scene, surface, begin)
     image = camera.form_image(exposure.mean_radiance, scene.raster)
-    element = 1e-12 * detector.geometry.pixel_vert_size * detector.geometry.pixel_horz_size
+    element = 1e-12 * detector.geometry.pixel_vert_size * detector.geometry.pixel_horz_size  # m²
     collected = transmittance * pi / (4 * f_number**2) * element * detector.time_step
     detector.photon.array = image * collected * _central_wavelength(camera.band) / (h * c)
 
@@ -114,5 +114,5 @@ def _setup(study: str, chip: str | None) -> tuple[Scene, Surface, Camera]:
         raise ValueError(f"chip: {name!r}, expected one of {', '.join(fitted.surfaces)}")
     camera = loaded.camera.on(fitted.scene.raster, loaded.seed)
     band = camera.band
-    counted = Band(band.lower, band.upper, PhotonResponse(band, _central_wavelength(band)))
+    counted = Band(band.lower, band.upper, PerPhotonResponse(band, _central_wavelength(band)))
     return fitted.scene, fitted.surfaces[name], replace(camera, band=counted)

@@ -6,8 +6,8 @@ Emissivity that differs from place to place
    :alt: Emissivity that differs from place to place
 
 Chip, shear band, workpiece and tool have an emissivity each, and each varies over its surface.
-Where the plastic strain passes from 0.3 to 0.5 the workpiece becomes chip; where its rate passes
-from 6 000 /s to 30 000 /s the chip becomes shear band:
+The workpiece becomes chip while the plastic strain rises from 0.3 to 0.5; the chip becomes shear
+band while the strain rate rises from 6 000 /s to 30 000 /s:
 
 .. math:: \varepsilon = (1 - b)\,\bigl[(1 - c)\,\varepsilon_\mathrm{workpiece}
    + c\,\varepsilon_\mathrm{chip}\bigr]

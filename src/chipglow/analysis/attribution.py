@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from chipglow.analysis.cut import middle_start
-from chipglow.analysis.images import exposed_chain
 from chipglow.analysis.places import Place
 from chipglow.camera import UNUSABLE, Camera
 from chipglow.camera.chain import Chain, ExposedChain, expose_apart
@@ -146,10 +145,8 @@ def attribute(
     players = _players(exposed, plan.effects)
     variables = _divided(exposed, players, plan.permutations, seed, check)
     half = replace(camera, integration_time=camera.integration_time / 2)
-    (shorter,) = half.expose_fields(
-        scene, (chain.emissivity,), start + half.integration_time / 2, check
-    )
-    gain = _size(exposed) - _size(exposed_chain(half, shorter, reference))
+    shorter = replace(chain, camera=half, field=chain.emissivity)
+    gain = _size(exposed) - _size(shorter.at(start + half.integration_time / 2, reference, check))
     variables["gain_half_exposure"] = ("y", "x"), gain, _KELVIN
     pixels = camera.pixels(scene.raster)
     coordinates = {"effect": list(players), "other_effect": list(players)}

@@ -39,13 +39,13 @@ RAKE_FACE, SHEAR_BAND = "rake face", "shear band"
 
 @dataclass(frozen=True)
 class CorrectionPlan:
-    """What is known of surfaces and camera if the shown exposure of a cut is corrected.
+    """Knowledge of surfaces and camera with which the shown exposure of a cut is corrected.
 
     Parameters
     ----------
     emissivity : mapping of str to float
-        Standard uncertainty of the mean emissivity by surface. That of other surfaces follows from
-        the heated chip of the same analysis, if there is one; else the emissivity is exact.
+        Standard uncertainty of the mean emissivity by surface. For other surfaces it follows from
+        the heated chip of the same analysis; without a heated chip the emissivity is exact.
     psf : float
         Relative standard uncertainty of the width of the point spread function.
     """

@@ -139,13 +139,15 @@ def spread_starts(scene: Scene, duration: float, count: int) -> NDArray[np.float
     if len(scene.times) == 1:
         return times
     last = times[-1] + spacing - duration
+    # A millionth of the duration, or of the time between frames, is rounding.
     if last < times[0] - 1e-6 * duration:
         raise ValueError(
             f"scene: it lasts {1e6 * (times[-1] + spacing - times[0]):.4g} us, "
             f"expected an exposure's {1e6 * duration:.4g} us or more"
         )
     wanted = np.linspace(times[0], max(last, times[0]), count) if count > 1 else times[:1]
-    nearest_frame = np.searchsorted(times, wanted + 1e-6 * spacing, side="right") - 1
+    slack = 1e-6 * spacing  # rounding
+    nearest_frame = np.searchsorted(times, wanted + slack, side="right") - 1
     return np.asarray(np.unique(times[nearest_frame]), dtype=np.float64)
 
 
@@ -160,7 +162,7 @@ def other_starts(scene: Scene, duration: float) -> list[float]:
     starts = []
     for block in scene.blocks:
         first, last = scene.times[block[0]], scene.times[block[-1]]
-        lasts = last - first + scene.frame_spacing
+        lasts = last - first + scene.frame_spacing  # known to a millionth, by rounding
         if block != scene.longest_block and lasts >= duration * (1 - 1e-6):
             starts.append(float(first))
     return starts

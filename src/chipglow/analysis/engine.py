@@ -10,8 +10,14 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from chipglow.analysis.attribution import attribute, read_attribution
-from chipglow.analysis.corrected import RAKE_FACE, SHEAR_BAND, CorrectedWindow, corrected_windows
+from chipglow.analysis.attribution import AttributionPlan, attribute, read_attribution
+from chipglow.analysis.corrected import (
+    RAKE_FACE,
+    SHEAR_BAND,
+    CorrectedWindow,
+    CorrectionPlan,
+    corrected_windows,
+)
 from chipglow.analysis.cut import Cut, Progress, cutting_forces, find_cut, lacking, spread_starts
 from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.heated import heated_objects
@@ -19,7 +25,7 @@ from chipglow.analysis.images import CASES
 from chipglow.analysis.outside import fractions_outside, outside_warnings
 from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, RakePlace
 from chipglow.analysis.plan import Plan
-from chipglow.analysis.read import Readings, Schedule, SurfacePlaces, Variables, read
+from chipglow.analysis.read import Schedule, SurfacePlaces, Variables, read, rows_of
 from chipglow.analysis.reductions import (
     Headline,
     headline,
@@ -28,7 +34,7 @@ from chipglow.analysis.reductions import (
     line_psf_portion,
     readings_frame,
 )
-from chipglow.camera import Camera, Flag, GaussianPSF, Measurement
+from chipglow.camera import Camera, Exposure, Flag, GaussianPSF, Measurement
 from chipglow.camera.exposure import sparse_frames, surroundings_radiance
 from chipglow.camera.measuring import measurement_of
 from chipglow.chip import (
@@ -218,6 +224,8 @@ class _Task:
     plan: Plan
     tell: Progress
     effects: Mapping[str, Collection[str]]
+    attribution: AttributionPlan | None = None
+    correction: CorrectionPlan | None = None
     failed: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -240,6 +248,8 @@ def analyse(
     plan: Plan,
     progress: Progress | None = None,
     effects: Mapping[str, Collection[str]] = CASES,
+    attribution: AttributionPlan | None = None,
+    correction: CorrectionPlan | None = None,
 ) -> Analysis:
     """Measure a scene with a virtual camera, and read the errors.
 
@@ -258,6 +268,11 @@ def analyse(
     effects : mapping
         The axis ``effects`` of the result: by name the effects that are on, members of `Effect`.
         ``all`` comes first and has all of them; ``without psf`` is required.
+    attribution : AttributionPlan, optional
+        Effects among which the errors of the shown exposure are divided; None: they are not.
+    correction : CorrectionPlan, optional
+        Knowledge for correcting the shown exposure of a cut near the cutting edge; None: it
+        is not corrected.
 
     Returns
     -------
@@ -273,29 +288,30 @@ def analyse(
         place is outside the pixels, or a surface cannot be applied to the scene.
     """
     tell = progress or (lambda label, part: None)
-    task = _Task(scene, surfaces, camera, plan, tell, effects)
+    task = _Task(scene, surfaces, camera, plan, tell, effects, attribution, correction)
     fields = {name: camera.prepare(surface, scene) for name, surface in surfaces.items()}
     schedule, cut, missing = _schedule(task)
     readings = read(scene, surfaces, fields, camera, schedule, lambda part: tell("camera", part))
+    data = readings.data
     measurements = {
         name: measurement_of(
-            camera.redrawn(number), np.stack(images), schedule.starts, scene.raster
+            camera.redrawn(number), data.radiance.values[number], schedule.starts, scene.raster
         )
-        for number, (name, images) in enumerate(readings.images.items())
+        for number, name in enumerate(fields)
     }
     middle = scene.frame_at(schedule.starts[schedule.shown] + task.duration / 2)
     frame = cut.segments[0].frame if cut else scene.frame(middle)
-    variables = {
-        **_scene_variables(task, frame, fields, readings),
-        **_image_variables(measurements, readings, schedule.shown),
-        **readings.variables("segment" if cut else "exposure"),
-    }
-    variables |= _corrected(camera, variables) | _outside(schedule, readings, measurements)
-    variables |= task.attempt("attribution", lambda: _attribution(task, readings)) or {}
+    data = data.drop_vars("radiance").assign(
+        _scene_variables(task, frame, fields, readings.shown)
+        | _image_variables(measurements, schedule.shown)
+    )
+    data = data.assign(_corrected(camera, data) | _outside(schedule, data, measurements))
+    attributed = task.attempt("attribution", lambda: _attribution(task, schedule, data))
+    data = data.assign(attributed or {})
     if cut is not None:
         cut = _completed(task, cut, measurements, schedule.shown)
-        variables |= _cut_variables(task, cut, measurements)
-    data = xr.Dataset(variables, attrs=_attributes(task, schedule, cut))
+        data = data.assign(_cut_variables(task, cut, measurements))
+    data = data.assign_attrs(_attributes(task, schedule, cut))
     data = data.set_coords([name for name in _COORDINATES if name in data])
     exposure = schedule.drawn.index(schedule.shown)
     placed = [(view.surface, place) for view in schedule.views for place in view.places[exposure]]
@@ -311,7 +327,7 @@ def analyse(
         cut=cut,
         warnings=(
             *_scene_warnings(task, cut),
-            *_image_warnings(task, readings),
+            *_image_warnings(task, readings.shown),
             *_range_warnings(data, measurements, schedule.shown),
             *_filled_warnings(scene, schedule.starts[schedule.shown], task.duration, placed),
         ),
@@ -328,7 +344,7 @@ def schedule_of(
 
 
 def _schedule(task: _Task) -> tuple[Schedule, Cut | None, tuple[str, ...]]:
-    """Return the schedule with the cut, if the scene shows one, or with what it lacks."""
+    """Return the schedule, the cut if the scene shows one, and the missing parts if not."""
     cut, missing = _find_cut(task)
     return _scene_schedule(task) if cut is None else _cut_schedule(task, cut), cut, missing
 
@@ -380,6 +396,7 @@ def _cut_schedule(task: _Task, cut: Cut) -> Schedule:
             for width in plan.psf_widths
         ],
         headlines=HEADLINES,
+        cause="segment",
     )
 
 
@@ -462,7 +479,7 @@ def _corrected_beside_edge(
     task: _Task, cut: Cut, frames: Mapping[str, Measurement]
 ) -> tuple[CorrectedWindow, ...]:
     """Return the corrected parts of the shown exposure; none without a plan or a blur."""
-    plan = task.plan.correction
+    plan = task.correction
     if plan is None or task.camera.psf is None:
         return ()
     task.tell("correction", 0.0)
@@ -476,15 +493,17 @@ def _corrected_beside_edge(
 
 
 def _scene_variables(
-    task: _Task, frame: Frame, fields: Mapping[str, EmissivityField], readings: Readings
+    task: _Task,
+    frame: Frame,
+    fields: Mapping[str, EmissivityField],
+    exposures: Mapping[str, Exposure],
 ) -> Variables:
     """Return the scene at the shown exposure, its emissivity and radiance temperature."""
     raster, temperature = task.scene.raster, task.camera.band.temperature
-    radiant = [temperature(exposure.centre_radiance) for exposure, _ in readings.shown.values()]
+    radiant = [temperature(exposure.centre_radiance) for exposure in exposures.values()]
     known = {name: getattr(frame, name) for name in _SHOWN_FIELDS}
     over = "surface", "y", "x"
     return {
-        "surface": ("surface", list(fields)),
         "y": ("y", raster.y, {"units": "m"}),
         "x": ("x", raster.x, {"units": "m"}),
         **{
@@ -501,24 +520,12 @@ def _scene_variables(
     }
 
 
-def _image_variables(
-    measurements: Mapping[str, Measurement], readings: Readings, shown: int
-) -> Variables:
-    every = list(measurements.values())
-    pixels, per_pixel = every[0].raster, ("pixel_y", "pixel_x")
+def _image_variables(measurements: Mapping[str, Measurement], shown: int) -> Variables:
+    every, per_pixel = list(measurements.values()), ("pixel_y", "pixel_x")
     over = "surface", "instant", *per_pixel
     return {
-        "instant": ("instant", every[0].times, {"units": "s"}),
-        "pixel_y": ("pixel_y", pixels.y, {"units": "m"}),
-        "pixel_x": ("pixel_x", pixels.x, {"units": "m"}),
         "radiance_temperature": (over, [one.radiance_temperature() for one in every], _KELVIN),
-        "reference_temperature": (over, list(readings.references.values()), _KELVIN),
         "flags": (over, [one.flags for one in every], {"units": "1"}),
-        "image_measured": (
-            ("surface", "effects", *per_pixel),
-            np.stack([stack for _, stack in readings.shown.values()]),
-            _KELVIN,
-        ),
         # A detector may flag more than the pixels below the limit.
         "flagged": (
             ("surface", *per_pixel),
@@ -528,46 +535,47 @@ def _image_variables(
     }
 
 
-def _corrected(camera: Camera, variables: Variables) -> Variables:
+def _corrected(camera: Camera, data: xr.Dataset) -> Variables:
     """Return the emissivity to set in the camera, and the temperatures that it then shows.
 
     It is the median of the surface's emissivity in the upper half of the range of temperatures.
     """
-    emissivity, temperature = variables["emissivity"][1], variables["temperature"][1]
+    emissivity, temperature = data.emissivity.values, data.temperature.values
     hot = temperature >= (np.nanmin(temperature) + np.nanmax(temperature)) / 2
     assumed = np.nanmedian(np.where(hot, emissivity, np.nan), axis=(1, 2))
-    number = [variables["surface"][1].index(name) for name in variables["seen_surface"][1]]
+    surfaces = data.surface.values.tolist()
+    number = [surfaces.index(name) for name in data.seen_surface.values]
     set_to = assumed[number][:, None, None, None]
     band = camera.band
     reflected = surroundings_radiance(band, camera.reflected)
-    measured = variables["measured"][1][..., 0]
+    measured = data.measured.values[..., 0]
     light = (band.radiance(np.nan_to_num(measured)) - (1 - set_to) * reflected) / set_to
     shown = np.where(
         np.isfinite(measured), band.temperature(np.maximum(light, _LEAST_LIGHT)), np.nan
     )
     return {
         "set_emissivity": ("surface", assumed, {"units": "1"}),
-        "corrected": (variables["reference"][0], shown, _KELVIN),
+        "corrected": (data.reference.dims, shown, _KELVIN),
     }
 
 
 def _outside(
-    schedule: Schedule, readings: Readings, measurements: Mapping[str, Measurement]
+    schedule: Schedule, data: xr.Dataset, measurements: Mapping[str, Measurement]
 ) -> Variables:
     """Return the fractions of each reading's place outside the range, means over the exposures."""
-    fractions = np.full((2, len(readings.readings)), np.nan)
-    for number, view in enumerate(schedule.views):
+    fractions = np.full((2, data.sizes["reading"]), np.nan)
+    for view in schedule.views:
         one = measurements[view.surface]
         measured = one.radiance_temperature(flagged=True)
-        images = np.where(np.isnan(readings.references[view.surface]), np.nan, measured)
-        for rows in readings.of(number):
+        references = data.reference_temperature.sel(surface=view.surface).values
+        images = np.where(np.isnan(references), np.nan, measured)
+        for number, place in enumerate(view.places[0]):
             every = [
-                fractions_outside(
-                    places[rows.place], one.flags[instant], images[instant], one.raster
-                )
+                fractions_outside(places[number], one.flags[instant], images[instant], one.raster)
                 for instant, places in zip(schedule.drawn, view.places, strict=True)
             ]
-            fractions[:, rows.readings] = np.mean(every, axis=0)[:, None]
+            rows = rows_of(data, view.surface, place)
+            fractions[:, rows] = np.mean(every, axis=0)[:, None]
     below, saturated = fractions
     return {
         "below_range": ("reading", below, {"units": "1"}),
@@ -575,12 +583,11 @@ def _outside(
     }
 
 
-def _attribution(task: _Task, readings: Readings) -> Variables:
+def _attribution(task: _Task, schedule: Schedule, data: xr.Dataset) -> Variables:
     """Return the contributions of the effects in the shown exposure, and at the readings."""
-    plan, schedule = task.plan.attribution, readings.schedule
+    plan, shown = task.attribution, schedule.shown
     if plan is None:
         return {}
-    shown = schedule.shown
     every = []
     how = plan.effects, plan.reference, plan.permutations
     for number, surface in enumerate(task.surfaces.values()):
@@ -588,33 +595,43 @@ def _attribution(task: _Task, readings: Readings) -> Variables:
         camera, start = task.camera.redrawn(number), float(schedule.starts[shown])
         every.append(attribute(task.scene, camera, surface, start, *how))
     task.tell("attribution", 1.0)
-    data = xr.concat(every, "surface", join="outer").rename(y="pixel_y", x="pixel_x")
-    at_readings = np.full((len(readings.readings), data.sizes["effect"] + 1), np.nan)
-    points = readings.along.shape[-1]
-    along = np.full((len(readings.lines), data.sizes["effect"], points), np.nan)
-    exposure, names = schedule.drawn.index(shown), list(task.surfaces)
-    pixels = task.camera.pixels(task.scene.raster)
-    for number, view in enumerate(schedule.views):
-        of_surface = every[names.index(view.surface)]
-        images = readings.references[view.surface][shown], readings.shown[view.surface][1][0]
-        for rows in readings.of(number):
-            place = view.places[exposure][rows.place]
-            values, lines = read_attribution(of_surface, place, images, pixels)
-            at_readings[rows.readings] = values
-            for name, parts in lines.items():
-                along[rows.lines[name], :, : parts.shape[1]] = parts
+    joined = xr.concat(every, "surface", join="outer").rename(y="pixel_y", x="pixel_x")
     variables: Variables = {
         f"attribution_{name}": (one.dims, one.values, one.attrs)
-        for name, one in data.data_vars.items()
+        for name, one in joined.data_vars.items()
     }
-    if readings.lines:
-        variables["attribution_line"] = ("line", "effect", "point"), along, _KELVIN
-    return {
-        **variables,
-        "effect": ("effect", data.effect.values),
+    variables["effect"] = "effect", joined.effect.values
+    attributions = dict(zip(task.surfaces, every, strict=True))
+    return variables | _attribution_at_places(task, schedule, data, attributions)
+
+
+def _attribution_at_places(
+    task: _Task, schedule: Schedule, data: xr.Dataset, attributions: Mapping[str, xr.Dataset]
+) -> Variables:
+    """Return the contributions of the effects at the readings and along the lines."""
+    effects = next(iter(attributions.values())).sizes["effect"]
+    at_readings = np.full((data.sizes["reading"], effects + 1), np.nan)
+    lines = data.line.values.tolist() if "line" in data.dims else []
+    along = np.full((len(lines), effects, data.sizes.get("point", 0)), np.nan)
+    exposure, pixels = schedule.drawn.index(schedule.shown), task.camera.pixels(task.scene.raster)
+    for number, view in enumerate(schedule.views):
+        seen = data.sel(surface=view.surface)
+        reference = seen.reference_temperature.values[schedule.shown]
+        images = reference, seen.image_measured.values[0]
+        for place in view.places[exposure]:
+            values, parts_of_lines = read_attribution(
+                attributions[view.surface], place, images, pixels
+            )
+            at_readings[rows_of(data, view.surface, place)] = values
+            for name, parts in parts_of_lines.items():
+                along[lines.index(schedule.named(number, name)), :, : parts.shape[1]] = parts
+    variables: Variables = {
         "attribution_reading": (("reading", "effect"), at_readings[:, :-1], _KELVIN),
         "attribution_reading_gain": ("reading", at_readings[:, -1], _KELVIN),
     }
+    if lines:
+        variables["attribution_line"] = ("line", "effect", "point"), along, _KELVIN
+    return variables
 
 
 def _cut_variables(task: _Task, cut: Cut, measurements: Mapping[str, Measurement]) -> Variables:
@@ -632,6 +649,7 @@ def _attributes(task: _Task, schedule: Schedule, cut: Cut | None) -> dict[str, A
     attributes: dict[str, Any] = {
         "shown_instant": schedule.shown,
         "error_reference": plan.reference,
+        **({"attribution_reference": task.attribution.reference} if task.attribution else {}),
         **(tool_attributes(tool) if tool else {}),
     }
     if cut is not None:
@@ -703,8 +721,8 @@ def _scene_warnings(task: _Task, cut: Cut | None) -> Iterator[str]:
     )
 
 
-def _image_warnings(task: _Task, readings: Readings) -> Iterator[str]:
-    for number, (name, (exposure, _)) in enumerate(readings.shown.items()):
+def _image_warnings(task: _Task, exposures: Mapping[str, Exposure]) -> Iterator[str]:
+    for number, (name, exposure) in enumerate(exposures.items()):
         for warning in task.camera.redrawn(number).form_measurement(exposure).notes.warnings:
             yield f"Image of {name}. {warning}"
 

@@ -99,6 +99,7 @@ def _heated_chip(
 ) -> HeatedObject:
     pitch, (first, last) = camera.pitch, _CHIP_ROWS
     between, half_band = 0.5 * spacing / pitch, 0.5 * width / pitch
+    # The body between two bands, without the parts near them; at most half of the usual image.
     half_body = min(0.3 * spacing / pitch, _COLUMNS / 4)
     columns = max(_COLUMNS, 2 * ceil(max(between + half_body, half_band)))
     raster = _raster(pitch, columns)
@@ -134,6 +135,7 @@ def _heated_tool(
     camera: Camera, surface: FeatureSurface, tool: Tool, textures: int
 ) -> HeatedObject:
     pitch, (x, y) = camera.pitch, tool.edge_point
+    # The edge is 30 % of the width from the left and 10 % of the height above the bottom.
     raster = _raster(pitch, _COLUMNS, (x - 0.3 * _COLUMNS * pitch, y + 0.9 * _ROWS * pitch))
 
     def depth(of: Raster) -> NDArray[np.float64]:

@@ -93,7 +93,7 @@ def error_parts(
         over the exposure minus the maximum, at the samples of the reference; ``footprint``, the
         mean over the pixel's area minus the reference of a scene that stands still; ``optics``,
         further terms of the optics; ``psf``; ``detector``. Their sum is ``case_1``. They include
-        ``texture``, which is there with `untextured`: the error minus the error of the surface
+        ``texture``, present if `untextured` is passed: the error minus the error of the surface
         without texture.
 
     Notes

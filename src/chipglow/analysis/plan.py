@@ -3,8 +3,6 @@
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from chipglow.analysis.attribution import AttributionPlan
-from chipglow.analysis.corrected import CorrectionPlan
 from chipglow.analysis.places import LinePlace, Place, PointPlace, RegionPlace
 from chipglow.camera import ReferenceKind
 from chipglow.laboratory.emissivity import RegionSection
@@ -25,11 +23,6 @@ class Plan(Part):
     cut : bool
         Whether a scene that shows a cut is analysed segment by segment, at the rake face and the
         shear band. Otherwise the scene is analysed exposure by exposure.
-    attribution : AttributionPlan, optional
-        Effects among which the errors of the shown exposure are divided; None: they are not.
-    correction: CorrectionPlan, optional
-        What is known if the shown exposure of a cut is corrected beside the cutting edge; None: it
-        is not corrected.
 
     Raises
     ------
@@ -37,13 +30,16 @@ class Plan(Part):
         If a number is not positive, there are no widths, or two places have the same name.
     """
 
-    exposures: Annotated[int, Parameter("Exposures, spread evenly over the scene.", least=1)] = 9
+    exposures: Annotated[
+        int, Parameter("Exposures, spread evenly over the scene.", least=1, most=10_000)
+    ] = 9
     phases: Annotated[
         int,
         Parameter(
             "Positions of the pixels along each axis, evenly over a pixel, on which each headline "
             "is drawn: 9 gives 81.",
             least=1,
+            most=100,
         ),
     ] = 9
     textures: Annotated[
@@ -52,6 +48,7 @@ class Plan(Part):
             "Textures of the emissivity on which each headline is drawn: of the study's seed "
             "and those after it.",
             least=1,
+            most=1000,
         ),
     ] = 5
     rake_chip: Annotated[
@@ -99,8 +96,6 @@ class Plan(Part):
     ] = field(default_factory=dict)
     places: tuple[Place, ...] = ()
     cut: bool = True
-    attribution: AttributionPlan | None = None
-    correction: CorrectionPlan | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

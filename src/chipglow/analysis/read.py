@@ -1,10 +1,11 @@
 """The loop of an analysis: readings of places over exposures, textures and pixel phases."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis.images import Stack, around, pixel_phases
@@ -66,6 +67,8 @@ class Schedule:
     vary: Sequence[Callable[[Camera], Camera]] = ()  # other cameras, for the first texture
     headlines: Mapping[tuple[str, str], str] = field(default_factory=dict)
     """Names of the readings of a cut, by place and quantity."""
+    cause: str = "exposure"
+    """Cause of the scatter over the exposures."""
 
     def named(self, view: int, text: str) -> str:
         """Return the name of a line or reading, with its surface if there are several."""
@@ -98,7 +101,7 @@ def read_place(place: Place, images: Stack, pixels: Raster) -> PlaceReading:
 
 @dataclass(frozen=True)
 class _Rows:
-    """Where the readings and lines of a place on a surface stand in the arrays."""
+    """Positions in the arrays of the readings and lines of a place on a surface."""
 
     view: int
     place: int
@@ -106,18 +109,32 @@ class _Rows:
     lines: Mapping[str, int]
 
 
-class Readings:
-    """Readings of every place over the draws, with the images of the surfaces; NaN for nothing.
+class Readings(NamedTuple):
+    """Result of `read`."""
+
+    data: xr.Dataset
+    """Readings and lines of all places over the draws, in K, NaN for nothing; images of the
+    surfaces. An element of the axis ``reading`` is a quantity of a place on a surface: each place
+    has its own quantities, and a cut reads each place on one surface."""
+    shown: Mapping[str, Exposure]
+    """The shown exposure of each surface."""
+
+
+def rows_of(data: xr.Dataset, surface: str, place: Place) -> NDArray[np.intp]:
+    """Return the indices of a place's readings on a surface, in the order of its quantities."""
+    here = (data.place.values == place.name) & (data.seen_surface.values == surface)
+    return np.flatnonzero(here)
+
+
+class _Arrays:
+    """Arrays of the readings and lines, filled draw by draw; NaN for nothing.
 
     Rows of a reading are the reference, the measured temperature with each set of effects, and the
     true temperature.
     """
 
-    def __init__(self, schedule: Schedule, surfaces: Iterable[str], pitch: float) -> None:
+    def __init__(self, schedule: Schedule, pitch: float) -> None:
         self.schedule = schedule
-        self.images: dict[str, list[Array]] = {name: [] for name in surfaces}
-        self.references: dict[str, list[Array]] = {name: [] for name in surfaces}
-        self.shown: dict[str, tuple[Exposure, Stack]] = {}
         self.rows: list[_Rows] = []
         self.readings: list[tuple[int, str, str]] = []  # view, place, quantity
         self.lines: list[tuple[int, str]] = []  # view, line
@@ -218,9 +235,9 @@ class Readings:
                 peak = nearest(seen.peak_radiance, seen.raster, point)
                 self.motion[row, exposure, texture] = temperature(mean) - temperature(peak)
 
-    def variables(self, cause: str) -> Variables:
-        """Return variables of the Dataset; `cause` of the scatter over the exposures."""
-        variables = self._coordinates(cause) | {
+    def variables(self) -> Variables:
+        """Return the variables of the Dataset."""
+        variables = self._coordinates() | {
             "reference": (("reading", *_DRAWS), self.values[..., 0], _KELVIN),
             "measured": (("reading", *_DRAWS, "effects"), self.values[..., 1:-1], _KELVIN),
             "true": (("reading", *_DRAWS), self.values[..., -1], _KELVIN),
@@ -231,12 +248,12 @@ class Readings:
             variables |= self._varied_variables()
         return variables
 
-    def _coordinates(self, cause: str) -> Variables:
+    def _coordinates(self) -> Variables:
         schedule, views, readings = self.schedule, self.schedule.views, self.readings
         starts = schedule.starts[list(schedule.drawn)]
         return {
             "effects": ("effects", list(schedule.effects)),
-            "exposure": ("exposure", starts, {"units": "s", "title": cause}),
+            "exposure": ("exposure", starts, {"units": "s", "title": schedule.cause}),
             "texture": ("texture", np.arange(self.values.shape[2])),
             "pixel_phase": ("pixel_phase", np.arange(self.values.shape[3])),
             "reading": ("reading", [schedule.reading(*one) for one in readings]),
@@ -275,6 +292,40 @@ class Readings:
         }
 
 
+class _Images:
+    """Images of the surfaces in all exposures, and with each set of effects in the shown one."""
+
+    def __init__(self, surfaces: Sequence[str], schedule: Schedule) -> None:
+        self.schedule = schedule
+        self.radiances: dict[str, list[Array]] = {name: [] for name in surfaces}
+        self.references: dict[str, list[Array]] = {name: [] for name in surfaces}
+        self.measured: list[Stack] = []
+        self.shown: dict[str, Exposure] = {}
+
+    def add(self, instant: int, number: int, chain: ExposedChain) -> None:
+        """Add the images of a surface in an exposure; its noise belongs to draw `number`."""
+        name = list(self.radiances)[number]
+        self.radiances[name].append(chain.radiance())
+        self.references[name].append(chain.reference())
+        if instant == self.schedule.shown:
+            redrawn = chain.through(chain.camera.redrawn(number))
+            self.measured.append(redrawn.stack(self.schedule.effects)[1:])
+            self.shown[name] = chain.exposure
+
+    def variables(self, pixels: Raster) -> Variables:
+        """Return the variables of the Dataset."""
+        over = "surface", "instant", "pixel_y", "pixel_x"
+        return {
+            "surface": ("surface", list(self.radiances)),
+            "instant": ("instant", self.schedule.starts, {"units": "s"}),
+            "pixel_y": ("pixel_y", pixels.y, _METRE),
+            "pixel_x": ("pixel_x", pixels.x, _METRE),
+            "radiance": (over, np.array(list(self.radiances.values())), {"units": "W/(m² sr)"}),
+            "reference_temperature": (over, np.array(list(self.references.values())), _KELVIN),
+            "image_measured": (("surface", "effects", *over[2:]), np.stack(self.measured), _KELVIN),
+        }
+
+
 def read(
     scene: Scene,
     surfaces: Mapping[str, Surface],
@@ -292,7 +343,8 @@ def read(
         for view in schedule.views
         for number in range(1, view.textures)
     }
-    readings = Readings(schedule, fields, camera.pitch)
+    arrays = _Arrays(schedule, camera.pitch)
+    images = _Images(list(fields), schedule)
     cameras = pixel_phases(camera, schedule.phases)
     share = 1 / (len(schedule.starts) + len(schedule.drawn))
 
@@ -310,18 +362,14 @@ def read(
             for (key, chain), exposure in zip(looking.items(), exposures, strict=True)
         }
         for number, name in enumerate(fields):
-            chain = exposed[name, 0]
-            readings.images[name].append(chain.radiance())
-            readings.references[name].append(chain.reference())
-            if i == schedule.shown:
-                stack = chain.through(camera.redrawn(number)).stack(schedule.effects)
-                readings.shown[name] = chain.exposure, stack[1:]
+            images.add(i, number, exposed[name, 0])
         if is_drawn:
             sharing = {
                 key: chain.exposed(exposed[key].exposure, schedule.reference, shares_blur=True)
                 for key, chain in looking.items()
             }
             drawn = schedule.drawn.index(i)
-            readings.read_draws(drawn, sharing, cameras, share_from(begun + share))
+            arrays.read_draws(drawn, sharing, cameras, share_from(begun + share))
     progress(1.0)
-    return readings
+    pixels = camera.pixels(scene.raster)
+    return Readings(xr.Dataset(images.variables(pixels) | arrays.variables()), images.shown)

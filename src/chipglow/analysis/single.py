@@ -1,29 +1,26 @@
 """Single readings: one place in one exposure with one texture and pixel position, quickly.
 
 An uncertainty budget and a choice of settings need thousands of readings with other cameras and
-surfaces. Each exposes only a window of the scene around the place. The light that blurs into the
-window from beyond it is computed with the nominal camera and surface.
+surfaces, at random instead of all draws of a schedule.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import replace
+from typing import Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chipglow.analysis.cut import Progress
 from chipglow.analysis.engine import schedule_of
+from chipglow.analysis.images import ALL, CASES
 from chipglow.analysis.outside import fractions_outside
-from chipglow.analysis.places import Place
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.read import Schedule, read_place
+from chipglow.analysis.window import Moment, Nominal, Window
 from chipglow.camera import Camera
-from chipglow.camera.chain import Chain, expose_chains, read_temperature
 from chipglow.quantities import Array
-from chipglow.scene import Frame, Raster, Scene, sample
-from chipglow.scene.lines import nearest
-from chipglow.surface import FeatureTrends, ModifiedSurface, Surface
+from chipglow.scene import Scene
+from chipglow.surface import Surface
 
 EXPOSURE, TEXTURE, ACROSS, DOWN, NOISE = RANDOM = (
     "exposure",
@@ -37,28 +34,13 @@ EXPOSURE, TEXTURE, ACROSS, DOWN, NOISE = RANDOM = (
 REFERENCE, MEASURED, BELOW, SATURATED = range(4)
 """Values of a reading: temperatures, and fractions of its place that cannot be read."""
 
-_BLUR_WIDTHS: Final = 3.0
-"""Margin of a window around its place, in full widths at half maximum of the blur."""
-
-_PIXELS: Final = 4.0
-"""Further margin in pixels."""
+_EVERY_EFFECT: Final = {ALL: CASES[ALL]}
 
 _SEEDS: Final = 2**31
 """Seeds of textures and noise: those that fit into 31 bits."""
 
-
-@dataclass(frozen=True, eq=False)
-class _Window:
-    """Part of a scene during one exposure; `beyond` is light on the nominal camera's pixels."""
-
-    scene: Scene
-    place: Place
-    surface: str
-    rows: NDArray[np.bool_]  # of the readings
-    start: float
-    limits: tuple[float, float]  # in which an exposure must lie, in s
-    beyond: Array | None = None
-    pixels: Raster | None = None
+_Key: TypeAlias = tuple[int, int]
+"""Number of a view of the schedule, and of a place in it."""
 
 
 class SingleReadings:
@@ -119,15 +101,15 @@ class SingleReadings:
             raise ValueError(f"{unknown[0]}: no such place or reading, expected one of {names}")
         kept = {name: key for name, key in every.items() if not at or name in at or key[2] in at}
         self.names, self.places = tuple(kept), tuple(key[2] for key in kept.values())
-        self._raster = scene.raster
-        self._reference, self._duration = plan.reference, spread.integration_time
+        self._reference = plan.reference
         keys = {key[:2] for key in kept.values()}
         owners = [key[:2] for key in every.values()]
         self._kept = np.array([name in kept for name in every])
         self._rows = {key: np.array([one == key for one in owners]) for key in keys}
         self._size = len(every)
-        self._exposures = [
-            self._windows(scene, surfaces, replace(camera, shape=None), schedule, number)
+        nominal = Nominal(scene, surfaces, replace(camera, shape=None))
+        self._moments = [
+            self._moment(nominal, schedule, number, spread.integration_time)
             for number in range(len(schedule.drawn))
         ]
         used = {schedule.views[n].surface for n, _ in keys}
@@ -150,128 +132,28 @@ class SingleReadings:
         moved = np.multiply([draw.get(name, 0.0) for name in (ACROSS, DOWN)], camera.pitch)
         right, down = (moved + camera.offset).tolist()
         seen = replace(camera, shape=None, offset=(right, down)).redrawn(noise)
+        moment, windows = self._moments[int(draw.get(EXPOSURE, 0.0) * len(self._moments))]
+        start = moment.begin(camera.integration_time)
         values = np.full((self._size, 4), np.nan)
-        number = int(draw.get(EXPOSURE, 0.0) * len(self._exposures))
-        for window in self._exposures[number]:
+        for key, window in windows.items():
+            rows = self._rows[key]
             surface = surfaces[window.surface].redrawn(texture)
-            moved = _on_grid(seen, self._raster, window)
-            stack, flags, pixels = self._look(window, moved, surface)
-            values[window.rows, :BELOW] = read_place(window.place, stack, pixels).values
-            outside = fractions_outside(window.place, flags, stack[MEASURED], pixels)
-            values[window.rows, BELOW:] = outside
+            chain = window.chain(seen, surface).at(start, self._reference)
+            images, pixels = chain.stack(_EVERY_EFFECT), chain.pixels
+            values[rows, :BELOW] = read_place(window.place, images, pixels).values
+            flags = chain.read().flags
+            values[rows, BELOW:] = fractions_outside(window.place, flags, images[MEASURED], pixels)
         return np.asarray(values[self._kept])
 
-    def _look(
-        self, window: _Window, camera: Camera, surface: Surface
-    ) -> tuple[Array, NDArray[np.uint8], Raster]:
-        """Return `REFERENCE` and `MEASURED` of a window, and the flags of its pixels."""
-        start = self._start(camera, window.start, window.limits)
-        chain = Chain(camera, window.scene, surface).at(start, self._reference)
-        pixels, radiance = camera.pixels(window.scene.raster), chain.radiance()
-        if window.beyond is not None and window.pixels is not None:
-            light = sample(window.beyond, window.pixels, pixels.centres)
-            radiance = np.maximum(radiance + np.nan_to_num(light), 0.0)
-        kelvins, flags = read_temperature(camera, radiance, start)
-        reference = chain.reference()
-        measured = np.where(np.isnan(reference), np.nan, kelvins)
-        return np.stack([reference, measured]), flags, pixels
-
-    def _start(self, camera: Camera, start: float, limits: tuple[float, float]) -> float:
-        """Return the start of a camera's exposure in the middle of one of the spread ones."""
-        first, last = limits
-        middle = start + (self._duration - camera.integration_time) / 2
-        return max(min(middle, last - camera.integration_time), first)
-
-    def _windows(
-        self,
-        scene: Scene,
-        surfaces: Mapping[str, Surface],
-        camera: Camera,
-        schedule: Schedule,
-        number: int,
-    ) -> list[_Window]:
-        """Return the windows of the places in one exposure."""
+    def _moment(
+        self, nominal: Nominal, schedule: Schedule, number: int, duration: float
+    ) -> tuple[Moment, dict[_Key, Window]]:
+        """Return an exposure of a schedule, and a window around each place that is read."""
         start = float(schedule.starts[schedule.drawn[number]])
-        frame = scene.frame_at(start)
-        block = next(one for one in scene.blocks if frame in one)
-        limits = float(scene.times[block[0]]), float(scene.times[block[-1]] + scene.frame_spacing)
-        if len(scene.times) == 1:
-            limits = -np.inf, np.inf
-        begin = self._start(camera, start, limits)
-        used = {schedule.views[n].surface for n, _ in self._rows}
-        small = [name for name in used if _is_local(surfaces[name]) and camera.line_time is None]
-        whole, frames = {}, []
-        if small:
-            chains = [Chain(camera, scene, surfaces[name]) for name in small]
-            exposures = expose_chains(chains, begin)
-            whole = {
-                name: chain.exposed(exposure).radiance()
-                for name, chain, exposure in zip(small, chains, exposures, strict=True)
-            }
-            reach = camera.integration_time / 2
-            first, last = (scene.frame_at(begin + at * reach) for at in (-1.0, 3.0))
-            frames = list(scene.frames(range(max(first, block[0]), min(last, block[-1]) + 1)))
-        windows = []
-        for key, rows in self._rows.items():
-            view = schedule.views[key[0]]
-            place = view.places[number][key[1]]
-            part = _around(place, scene.raster, camera) if view.surface in whole else None
-            one = _Window(scene, place, view.surface, rows, start, limits)
-            if part is not None:
-                one = replace(one, scene=_cropped(frames, scene, part))
-                moved = _on_grid(camera, scene.raster, one)
-                image = Chain(moved, one.scene, surfaces[view.surface]).at(begin).radiance()
-                pixels = moved.pixels(one.scene.raster)
-                light = nearest(whole[view.surface], camera.pixels(scene.raster), pixels.centres)
-                one = replace(one, beyond=np.nan_to_num(light - image), pixels=pixels)
-            windows.append(one)
-        return windows
-
-
-def _is_local(surface: Surface) -> bool:
-    """Return whether the emissivity of a sample follows from that sample alone."""
-    return not isinstance(surface, ModifiedSurface) or all(
-        isinstance(one, FeatureTrends) for one in surface.modifiers
-    )
-
-
-def _around(place: Place, raster: Raster, camera: Camera) -> tuple[slice, slice] | None:
-    """Return the rows and columns of a raster around a place; None for all."""
-    outline = place.outline()
-    if outline is None:
-        return None
-    points = np.concatenate(
-        [outline, *(line.points for line in place.lines(camera.pitch).values())]
-    )
-    blur = camera.psf.fwhm if camera.psf is not None else 0.0
-    margin = (_BLUR_WIDTHS * blur + _PIXELS * camera.pitch) / raster.spacing
-    index = (points - [raster.left, raster.top]) * [1, -1] / raster.spacing
-    low, high = np.floor(index.min(axis=0) - margin), np.ceil(index.max(axis=0) + margin)
-    limits = np.clip([low, high], 0, [raster.columns, raster.rows]).astype(int)
-    (left, top), (right, bottom) = limits.tolist()
-    return slice(top, bottom), slice(left, right)
-
-
-def _cropped(frames: Sequence[Frame], scene: Scene, part: tuple[slice, slice]) -> Scene:
-    raster, (down, across) = scene.raster, part
-    names = [name for name in scene.fields if getattr(frames[0], name, None) is not None]
-    if "material" not in names:
-        names.append("material")
-    corner = raster.left + across.start * raster.spacing, raster.top - down.start * raster.spacing
-    shape = down.stop - down.start, across.stop - across.start
-    return Scene.from_fields(
-        Raster(*corner, raster.spacing, *shape),
-        [frame.time for frame in frames],
-        {name: np.stack([getattr(frame, name)[part] for frame in frames]) for name in names},
-        scene.tool,
-    )
-
-
-def _on_grid(camera: Camera, scene: Raster, window: _Window) -> Camera:
-    """Return a camera on a scene with the same pixels on a window of it."""
-    own = window.scene.raster
-    shift = own.left - scene.left, scene.top - own.top
-    if not any(shift):
-        return camera
-    right, down = np.mod(np.subtract(camera.offset, shift), camera.pitch).tolist()
-    return replace(camera, offset=(right, down))
+        moment = Moment.of(nominal.scene, start, duration)
+        parts = nominal.parts({schedule.views[n].surface for n, _ in self._rows}, moment)
+        windows = {}
+        for view, place in self._rows:
+            seen = schedule.views[view]
+            windows[view, place] = parts.window(seen.places[number][place], seen.surface)
+        return moment, windows

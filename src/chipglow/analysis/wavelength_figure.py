@@ -16,6 +16,12 @@ from chipglow.drawing import drawing, scales
 _BEST: Final = 3
 """Bands alone, and pairs, of which the parts of the error are drawn."""
 
+_DARKEST: Final = 10
+"""Largest error that colours show, in smallest errors: a decade distinguishes the good bands."""
+
+_BAR: Final = 0.8
+"""Height of the bars of a band, in the distance between bands: a gap divides them."""
+
 _TICKS: Final = (1, 2, 3, 5, 7, 10, 20, 30, 50, 70, 100, 200, 300, 500)
 """Ticks of the colour bar in K."""
 
@@ -36,7 +42,7 @@ def draw_wavelengths(data: xr.Dataset) -> Figure:
         figure = drawing.new_figure(6.4)
         panels = figure.subplots(2, len(places), squeeze=False)
         known = frame.total_K[np.isfinite(frame.total_K)]
-        low, high = float(known.min()), float(min(known.max(), 10 * known.min()))
+        low, high = float(known.min()), float(min(known.max(), _DARKEST * known.min()))
         norm = LogNorm(low, high)
         for column, place in zip(panels.T, places, strict=True):
             rows = frame[frame.place == place]
@@ -76,7 +82,7 @@ def _draw_causes(axes: Axes, rows: pd.DataFrame) -> None:
     known = rows[np.isfinite(rows.total_K)].sort_values("total_K")
     alone = known.second_um == ""
     best = pd.concat([known[alone][:_BEST], known[~alone][:_BEST]])
-    height = 0.8 / len(_PARTS)
+    height = _BAR / len(_PARTS)
     places = np.arange(len(best))
     for number, (name, (label, colour)) in enumerate(_PARTS.items()):
         values = best[name].abs().fillna(0.0)

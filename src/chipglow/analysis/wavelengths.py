@@ -1,12 +1,11 @@
 """The error of one band and of the ratio of two against the true temperature, cause by cause."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import combinations
 from math import log
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple, Protocol
 
 import numpy as np
 import pandas as pd
@@ -17,7 +16,7 @@ from chipglow.analysis.cut import Progress, find_cut, spread_starts
 from chipglow.analysis.images import around, pixel_phases
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.ratio import CAUSES, true_temperature
-from chipglow.camera import Camera, Exposure, frame_weights
+from chipglow.camera import Camera, frame_weights
 from chipglow.camera.chain import Chain, ExposedChain, chains_in_bands, expose_chains
 from chipglow.camera.effect import EVERY, Effect
 from chipglow.camera.exposure import surroundings_radiance
@@ -25,17 +24,16 @@ from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
 from chipglow.quantities.units import INSTANT, POSITION, WAVELENGTHS
 from chipglow.radiometry import Band, RatioThermometer
 from chipglow.radiometry.band import PAPER_BAND
-from chipglow.scene import Scene, sample
+from chipglow.scene import Raster, Scene, sample
 from chipglow.scene.lines import nearest
 from chipglow.surface import Surface
 
 STEPS: Final = ("emissivity", "motion", "footprint", "optics", "delay")
 """The `CAUSES` of the mean error of a band or ratio; the others scatter."""
 
-_IDEAL, _FORMED, _DELAYED, _SHIFTED = range(4)
-"""Pixels read in every band; from the last on there is one for each of the directions."""
-
 _DIRECTIONS: Final = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
+"""In which the pixels of a second channel may be off: right, left, up and down."""
+
 _NOISE_SHAPE: Final = (64, 64)
 """Elements over which the noise is determined."""
 
@@ -248,85 +246,167 @@ def _draws(
     """Return every band and ratio at one spot with one texture, a draw for each phase."""
     duration = cameras[0].integration_time
     chains = chains_in_bands(surface, scene, cameras)
-    exposures = expose_chains(chains, spot.start)
-    images = late = _exposed(chains, exposures)
+    images = late = _exposed(chains, spot.start)
     if plan.delay:
-        late = _exposed(chains, expose_chains(chains, spot.start + plan.delay))
+        late = _exposed(chains, spot.start + plan.delay)
     centres = np.array([_centre(one, scene, spot) for one in pixel_phases(cameras[0], phases)])
-    pixels = []
-    for camera, seen, later in zip(cameras, images, late, strict=True):
-        moved = zip(pixel_phases(camera, phases), centres, strict=True)
-        read = [_of_pixel(one, seen, later, at, plan.misregistration) for one, at in moved]
-        pixels.append(np.transpose(read))
     part, window = around(scene.raster, centres)
-    at_centres = partial(sample, raster=window, points=centres)  # linear between the samples
-    local = [np.stack([one.centre_radiance[part], one.mean_radiance[part]]) for one in exposures]
     truth = true_temperature(scene, spot.start + duration / 2)[part]
-    compared = [
-        _compared(plan, cameras, bands, truth, local, pixels, at_centres) for bands in plan.ratios
+    samples = _Samples(window, centres, truth)
+    bands = [
+        _BandRadiances(
+            camera,
+            still=seen.exposure.centre_radiance[part],
+            mean=seen.exposure.mean_radiance[part],
+            pixels=_pixel_radiances(
+                pixel_phases(camera, phases), seen, later, centres, plan.misregistration
+            ),
+        )
+        for camera, seen, later in zip(cameras, images, late, strict=True)
     ]
-    return xr.concat(compared, "ratio").assign(
-        truth=("draw", at_centres(truth)), radiance=(("band", "draw"), np.stack(pixels)[:, _FORMED])
+    errors = []
+    for numbers in plan.ratios:
+        used = [bands[number] for number in numbers]
+        thermometer = (
+            _OneBand(plan, samples, *used) if len(used) == 1 else _Ratio(plan.thermometer(numbers))
+        )
+        errors.append(_errors(thermometer, samples, used))
+    return xr.concat(errors, "ratio").assign(
+        truth=("draw", samples.true_temperature),
+        radiance=(("band", "draw"), np.stack([one.pixels.formed for one in bands])),
     )
 
 
-def _exposed(chains: Sequence[Chain], exposures: Sequence[Exposure]) -> list[ExposedChain]:
-    pairs = zip(chains, exposures, strict=True)
+def _exposed(chains: Sequence[Chain], start: float) -> list[ExposedChain]:
+    pairs = zip(chains, expose_chains(chains, start), strict=True)
     return [chain.exposed(exposure, shares_blur=True) for chain, exposure in pairs]
 
 
-def _compared(
-    plan: WavelengthPlan,
-    cameras: Sequence[Camera],
-    bands: Sequence[int],
-    truth: Array,
-    local: Sequence[Array],
-    pixels: Sequence[Array],
-    at_centres: Callable[[Array], Array],
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """The samples around the pixels that are read, one pixel for each draw."""
+
+    raster: Raster
+    centres: Array  # of the pixels, shape (draw, 2)
+    truth: Array  # true temperature in K in the middle of the exposure, (y, x)
+
+    def at_centres(self, values: Array) -> Array:
+        """Return values at the pixels' centres, linear between the samples."""
+        return sample(values, self.raster, self.centres)
+
+    @property
+    def true_temperature(self) -> Array:
+        return self.at_centres(self.truth)
+
+
+class _PixelRadiances(NamedTuple):
+    """Radiances of the pixels in one band in W/(m² sr), one for each draw."""
+
+    ideal: Array  # without the optics
+    formed: Array
+    delayed: Array
+    shifted: Array  # shape (direction, draw)
+
+
+@dataclass(frozen=True, eq=False)
+class _BandRadiances:
+    """Radiances of samples and pixels in the band of a camera in W/(m² sr)."""
+
+    camera: Camera
+    still: Array  # of the samples in the middle of the exposure, (y, x)
+    mean: Array  # of the samples over the exposure, (y, x)
+    pixels: _PixelRadiances
+
+
+class _Thermometer(Protocol):
+    """A temperature in K from the radiances of one band, or of two."""
+
+    def of_samples(self, *radiances: Array) -> Array:
+        """Return the temperature of the samples."""
+
+    def of_pixels(self, *radiances: Array) -> Array:
+        """Return the temperature of the pixels, from radiances of shape (..., draw)."""
+
+    def gain(self, truth: Array, formed: Array) -> Array:
+        """Return the error in K over a small relative error of one radiance."""
+
+    def emissivity_uncertainty(self, truth: Array) -> Array:
+        """Return the standard uncertainty in K by that of the emissivity."""
+
+
+class _OneBand:
+    """One band, of which the emissivity at the centre of each pixel is known."""
+
+    def __init__(self, plan: WavelengthPlan, samples: _Samples, seen: _BandRadiances) -> None:
+        camera = seen.camera
+        self._band, self._relative = camera.band, plan.emissivity_uncertainty
+        self._environment = surroundings_radiance(camera.band, camera.reflected)
+        black = self._band.radiance(samples.truth)
+        self._emissivity = (seen.still - self._environment) / (black - self._environment)
+        self._at_centres = samples.at_centres(self._emissivity)
+
+    def of_samples(self, *radiances: Array) -> Array:
+        return self._temperature(self._emissivity, *radiances)
+
+    def of_pixels(self, *radiances: Array) -> Array:
+        return self._temperature(self._at_centres, *radiances)
+
+    def gain(self, truth: Array, formed: Array) -> Array:
+        return np.asarray(formed / (self._at_centres * self._band.slope(truth)))
+
+    def emissivity_uncertainty(self, truth: Array) -> Array:
+        above = self._band.radiance(truth) - self._environment
+        return np.asarray(self._relative * above / self._band.slope(truth))
+
+    def _temperature(self, emissivity: Array, radiance: Array) -> Array:
+        black = (radiance - self._environment) / emissivity + self._environment
+        return np.asarray(self._band.temperature(black))
+
+
+@dataclass(frozen=True)
+class _Ratio:
+    """The ratio of two bands; the emissivity is taken to be the same in both."""
+
+    thermometer: RatioThermometer
+
+    def of_samples(self, *radiances: Array) -> Array:
+        return self.thermometer.temperature(*radiances)
+
+    def of_pixels(self, *radiances: Array) -> Array:
+        return self.thermometer.temperature(*radiances)
+
+    def gain(self, truth: Array, formed: Array) -> Array:
+        return 1 / self.thermometer.sensitivity(truth)
+
+    def emissivity_uncertainty(self, truth: Array) -> Array:
+        return self.thermometer.uncertainty(truth)
+
+
+def _errors(
+    thermometer: _Thermometer, samples: _Samples, bands: Sequence[_BandRadiances]
 ) -> xr.Dataset:
-    """Return one band by the emissivity at the pixel's centre, or the ratio of a grey body."""
-    own, first = at_centres(truth), cameras[bands[0]]
-    on_samples: Callable[..., Array]
-    in_pixels: Callable[..., Array]
-    formed = [pixels[number][_FORMED] for number in bands]
-    if len(bands) > 1:
-        thermometer = plan.thermometer(bands)
-        on_samples = in_pixels = thermometer.temperature
-        gain, uncertainty = (1 / thermometer.sensitivity(own), thermometer.uncertainty(own))
-    else:
-        band, environment = first.band, surroundings_radiance(first.band, first.reflected)
-        emissivity = (local[bands[0]][0] - environment) / (band.radiance(truth) - environment)
-        at_centre, slope = at_centres(emissivity), band.slope(own)
-        on_samples = partial(_by_emissivity, band, environment, emissivity)
-        in_pixels = partial(_by_emissivity, band, environment, at_centre)
-        gain = formed[0] / (at_centre * slope)
-        uncertainty = plan.emissivity_uncertainty * (band.radiance(own) - environment) / slope
-    # A band alone is neither delayed nor shifted.
-    second = [pixels[number] for number in bands[1:]]
-    temperature = in_pixels(*formed)
-    chain = [
-        own,
-        *map(at_centres, on_samples(*(local[number] for number in bands))),
-        in_pixels(*(pixels[number][_IDEAL] for number in bands)),
+    """Return the errors of a thermometer, cause by cause in the order of `STEPS`."""
+    truth = samples.true_temperature
+    first, *others = [one.pixels for one in bands]  # a band alone is neither delayed nor shifted
+    temperature = thermometer.of_pixels(first.formed, *(one.formed for one in others))
+    readings = [
+        truth,
+        samples.at_centres(thermometer.of_samples(*(one.still for one in bands))),
+        samples.at_centres(thermometer.of_samples(*(one.mean for one in bands))),
+        thermometer.of_pixels(first.ideal, *(one.ideal for one in others)),
         temperature,
-        in_pixels(formed[0], *(one[_DELAYED] for one in second)),
+        thermometer.of_pixels(first.formed, *(one.delayed for one in others)),
     ]
-    shifted = in_pixels(formed[0], *(one[_SHIFTED:] for one in second)) - temperature
+    shifted = thermometer.of_pixels(first.formed, *(one.shifted for one in others)) - temperature
+    shifts = np.broadcast_to(shifted, (len(_DIRECTIONS), truth.size))
     return xr.Dataset(
         {
-            "step": (("cause", "draw"), np.diff(chain, axis=0)),
-            "misregistration": (
-                ("direction", "draw"),
-                np.broadcast_to(shifted, (len(_DIRECTIONS), own.size)),
-            ),
-            "gain": ("draw", gain),
-            "emissivity_uncertainty": ("draw", uncertainty),
+            "step": (("cause", "draw"), np.diff(readings, axis=0)),
+            "misregistration": (("direction", "draw"), shifts),
+            "gain": ("draw", thermometer.gain(truth, first.formed)),
+            "emissivity_uncertainty": ("draw", thermometer.emissivity_uncertainty(truth)),
         }
     )
-
-
-def _by_emissivity(band: Band, environment: float, emissivity: Array, radiance: Array) -> Array:
-    return np.asarray(band.temperature((radiance - environment) / emissivity + environment))
 
 
 def _of_place(
@@ -355,27 +435,43 @@ def _centre(camera: Camera, scene: Scene, spot: Spot) -> Array:
     return np.array([pixels.x[column], pixels.y[row]])
 
 
-def _of_pixel(
-    camera: Camera, images: ExposedChain, late: ExposedChain, centre: Array, distance: float
-) -> list[float]:
-    """Return the radiance of the pixel with a centre: ideal, formed, delayed, shifted."""
+def _pixel_radiances(
+    cameras: Sequence[Camera],
+    images: ExposedChain,
+    late: ExposedChain,
+    centres: Array,
+    distance: float,
+) -> _PixelRadiances:
+    """Return what the pixels with these centres receive in one band, one of each camera."""
 
     def read(
         of: ExposedChain, on: frozenset[Effect] = EVERY, shift: tuple[float, float] = (0.0, 0.0)
-    ) -> float:
-        # The pixel that looks elsewhere is one of a grid that begins within the first pixel.
-        corner = np.mod(np.array(camera.offset) + np.multiply(shift, [1, -1]), camera.pitch)
-        moved = replace(camera, offset=(float(corner[0]), float(corner[1])))
-        pixels = moved.pixels(of.exposure.raster)
-        return float(nearest(of.through(moved).radiance(on), pixels, centre + shift))
+    ) -> Array:
+        pairs = zip(cameras, centres, strict=True)
+        return np.array([_pixel_radiance(of, camera, at, on, shift) for camera, at in pairs])
 
     shifts = [(distance * x, distance * y) for x, y in _DIRECTIONS]
-    return [
-        read(images, EVERY - CAUSES["optics"]),
-        read(images),
-        read(late),
-        *(read(images, shift=shift) for shift in shifts),
-    ]
+    return _PixelRadiances(
+        ideal=read(images, EVERY - CAUSES["optics"]),
+        formed=read(images),
+        delayed=read(late),
+        shifted=np.stack([read(images, shift=shift) for shift in shifts]),
+    )
+
+
+def _pixel_radiance(
+    of: ExposedChain,
+    camera: Camera,
+    centre: Array,
+    on: frozenset[Effect],
+    shift: tuple[float, float],
+) -> float:
+    """Return the radiance of the pixel that looks aside of a centre, right and up in m."""
+    # That pixel is one of a grid that begins within the first pixel.
+    corner = np.mod(np.array(camera.offset) + np.multiply(shift, [1, -1]), camera.pitch)
+    moved = replace(camera, offset=(float(corner[0]), float(corner[1])))
+    pixels = moved.pixels(of.exposure.raster)
+    return float(nearest(of.through(moved).radiance(on), pixels, centre + shift))
 
 
 def _noise(camera: Camera, radiance: float) -> float:

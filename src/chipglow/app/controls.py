@@ -51,7 +51,7 @@ ERROR_IMAGES: Final[Mapping[str, str]] = {
 
 ERRORS, CORRECTION = "error", "correction"
 SHOWN_IMAGES: Final[Mapping[str, str]] = {ERRORS: "Scene and error", CORRECTION: "Correction"}
-"""What the three images are: scene, measured and error; or measured, corrected and one more."""
+"""Sets of three images: scene, measured and error; or measured, corrected and one more."""
 
 CORRECTION_IMAGES: Final[Mapping[str, str]] = {
     "half-width": "Half-width (95 %)",

@@ -24,6 +24,7 @@ from chipglow.app.pictures import Drawn, Panel, Picture
 from chipglow.drawing.scales import HEAT, PLAIN, SIGNED
 from chipglow.quantities import Array
 from chipglow.scene import Raster, Tool
+from chipglow.scene.tool import DRAWN_FACE
 
 MICRONS: Final = 1e6
 """Micrometres in a metre: axes are in micrometres."""
@@ -52,6 +53,9 @@ _CORRECTED: Final = "#c2571a"
 
 _BORDER: Final = 46
 """Pixels on the left of a figure for its labels, the same for all, so that they are aligned."""
+
+_LINE_HEIGHT: Final = 150
+"""Initial height in pixels of a figure of the temperatures along a line."""
 
 _SIDE: Final = 180
 """Initial size of a frame in pixels; page.js fits the figures to the page."""
@@ -109,7 +113,7 @@ class Line:
     """A figure of the temperatures along a line; the page fills its curves, see page.js."""
 
     def __init__(self, name: str, title: str, with_reference: bool) -> None:
-        self.figure = one = _figure(name, title, 150)
+        self.figure = one = _figure(name, title, _LINE_HEIGHT)
         curves = ("measured", "reference") if with_reference else ("measured",)
         source = ColumnDataSource(
             {"along": [], "measured": [], "reference": [], "corrected": []}, name=f"{name}_values"
@@ -152,7 +156,7 @@ class Line:
         self.corrected_item.visible = False
         one.add_layout(one.legend[0], "above")
         one.add_tools(HoverTool(tooltips=tips, mode="vline", renderers=drawn[-1:]))
-        one.x_range.range_padding = 0.02
+        one.x_range.range_padding = 0.02  # of the range on each side
         one.xaxis.axis_label = "distance / µm"
         one.yaxis.axis_label = "temperature / °C"
         one.min_border_left = _BORDER + 6
@@ -202,7 +206,7 @@ class Figures:
         spans = [
             Span(dimension=one, line_color="#808080", line_width=1) for one in ("height", "width")
         ]
-        outline = [] if tool is None else (MICRONS * tool.outline(3e-3).T).tolist()
+        outline = [] if tool is None else (MICRONS * tool.outline(DRAWN_FACE).T).tolist()
         for one in self.images.values():
             one.figure.add_tools(CrosshairTool(overlay=spans))
             _draw_over(one.figure, outline, places)
@@ -249,7 +253,7 @@ def _figure(name: str, title: str, height: int, **given: Any) -> Any:
 
 
 def _draw_over(one: Any, outline: list[list[float]], places: dict[str, ColumnDataSource]) -> None:
-    """Draw the tool, the lines and the cursor, each visible on any ground."""
+    """Draw tool, lines and cursor in two widths (pixels) and colours, to be seen on any ground."""
     for colour, width in (("white", 2.4), ("black", 1.2)) if outline else ():
         one.line(*outline, line_color=colour, line_width=width)
     for name in LINES:

@@ -22,8 +22,7 @@ from chipglow.quantities import Array, unchecked
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study
 from chipglow.surface import UniformSurface
-from chipglow.text import read_small_text, read_yaml
-from chipglow.text.yaml_file import parse_yaml
+from chipglow.text import parse_yaml, read_small_text, read_yaml
 
 QUICK_SAMPLES: Final = 35_000
 """Samples of a frame up to which a picture is computed at once, without a coarser one before."""
@@ -44,11 +43,14 @@ SHOWN_LINE: Final = "# Shown in chipglow app: "
 _Points: TypeAlias = Iterable[Any]
 """Pairs of x and y in m."""
 
+_HALF_LINE: Final = 0.4
+"""Half the length of a first line, as a fraction of the image: its ends are in the image."""
+
 
 def scene_model(
     scene: Scene, study: Study, name: str, file: str | None, shown: Mapping[str, Any] | None = None
 ) -> SceneModel:
-    """Open a scene at its developed shear band, else in its middle; a ValueError if too short.
+    """Open a scene at its developed shear band, else at its central frame; ValueError if too short.
 
     A study that the app saved contains cursor and lines; `shown` are its exposure and images.
     """
@@ -243,8 +245,8 @@ def _across(segment: Segment) -> list[_Points]:
 
 
 def _through(raster: Raster, place: tuple[float, float] | None = None) -> list[_Points]:
-    """Return a cursor at a place, by default the image's middle, and lines through it."""
+    """Return a cursor at a place, by default the image's centre, and lines through it."""
     left, right, bottom, top = raster.extent
     x, y = place or ((left + right) / 2, (bottom + top) / 2)
-    across, up = 0.4 * (right - left), 0.4 * (top - bottom)
+    across, up = _HALF_LINE * (right - left), _HALF_LINE * (top - bottom)
     return [[(x, y)], [(x - across, y), (x + across, y)], [(x, y - up), (x, y + up)]]

@@ -63,6 +63,24 @@ _HALF: Final = 24
 _STEP: Final = 16
 """Pixels by which this part follows the cursor, so that few moves need a new correction."""
 
+_KEPT: Final[Mapping[str, int]] = {
+    "errors": 8,
+    "parts": 2,
+    "correction": 8,
+    "contributions": 2,
+    "surface": 4,
+    "band": 4,
+    "laid": 4,
+    "quick exposure": 24,
+    "exposure": 2,
+    "displayed": 1,
+    "field": 6,
+}
+"""Number of kept results by stage: few of large results, many of small or slow ones."""
+
+_HARDLY_LARGER: Final = 1.5
+"""Size of a pixel, in coarse samples, below which a quick look takes half as long."""
+
 _LINE_OF: Final = {
     "reference": "true", "corrected": "temperature", "low": "lower", "high": "upper",
 }  # fmt: skip
@@ -198,9 +216,8 @@ class SceneModel:
             return True
         key, camera = self._exposure_key(state), state.study.camera
         kind = camera.psf.kind if camera.psf else ""
-        # A quick look at pixels hardly larger than the coarse samples takes half as long.
         on_samples = camera.psf_order != "detector" and kind == "annular-aperture"
-        is_slow = on_samples or camera.pitch < 1.5 * self.coarse.raster.spacing
+        is_slow = on_samples or camera.pitch < _HARDLY_LARGER * self.coarse.raster.spacing
         exact = key, self._camera(state, self.scene), False
         is_known = exact in self._caches["errors"]
         return key in self._caches["exposure"] and (is_known or not is_slow)
@@ -214,11 +231,11 @@ class SceneModel:
         images, untextured = (one and one.through(camera) for one in exposed)
         assert images is not None
         key = self._exposure_key(state), camera, quick
-        data = self._kept(8, "errors", key, lambda: errors_of(images))
+        data = self._kept("errors", key, lambda: errors_of(images))
 
         def parts() -> xr.Dataset:
             of = *key, untextured is None
-            return self._kept(2, "parts", of, lambda: parts_of(images, untextured))
+            return self._kept("parts", of, lambda: parts_of(images, untextured))
 
         error = data["case_1"]
         if shown != "total":
@@ -269,7 +286,7 @@ class SceneModel:
             )
             return Corrected(result, scene_truth(result, scene, camera, observed, start))
 
-        self._kept(8, "correction", self._correction_key(state), make)
+        self._kept("correction", self._correction_key(state), make)
         return self.picture(state)
 
     def _correction_key(self, state: State) -> Hashable:
@@ -314,7 +331,6 @@ class SceneModel:
             return {}
         scene, surface = self._on(state, quick=False)
         data = self._kept(
-            2,
             "contributions",
             (self._exposure_key(state), camera),
             lambda: attribute(scene, camera, surface, start, reference=against, check=check),
@@ -344,23 +360,23 @@ class SceneModel:
             effects={ALL: CASES[ALL]},
         )
         laid = {CURSOR: camera.prepare(surface.redrawn(0), scene)}
-        readings = read(scene, {CURSOR: surface}, laid, camera, schedule, progress)
-        reference, measured, _ = np.moveaxis(readings.values[0, 0], -1, 0)
-        error = measured - reference
+        data = read(scene, {CURSOR: surface}, laid, camera, schedule, progress).data
+        seen = data.isel(exposure=0, effects=0)
+        error = (seen.measured - seen.reference).values[0]
         lines = {
-            name: np.concatenate(readings.along[row, 0, :, :, 1]) - ZERO_CELSIUS
-            for row, name in enumerate(LINES)
+            name: np.concatenate(seen.line_measured.sel(line=line).values) - ZERO_CELSIUS
+            for name, line in LINES.items()
         }
         is_known = np.isfinite(error).all()
         return Drawn(
             state, lines, Distribution(error, ("texture", PIXEL_PHASE)) if is_known else None
         )
 
-    def _kept(self, size: int, stage: str, key: Hashable, make: Callable[[], _Result]) -> _Result:
+    def _kept(self, stage: str, key: Hashable, make: Callable[[], _Result]) -> _Result:
         """Return the result of a stage, of which the last ones are kept."""
         cache: dict[Hashable, _Result] = self._caches[stage]
         cache[key] = result = cache.pop(key) if key in cache else make()
-        if len(cache) > size:
+        if len(cache) > _KEPT[stage]:
             del cache[next(iter(cache))]
         return result
 
@@ -377,7 +393,7 @@ class SceneModel:
             (surface,) = fitted.surfaces.values()
             return fitted.scene, surface
 
-        return self._kept(4, "surface", (state.key(*_SURFACE), quick), make)
+        return self._kept("surface", (state.key(*_SURFACE), quick), make)
 
     def _camera(self, state: State, scene: Scene, quick: bool = False) -> Camera:
         """Return the study's camera; if quick, with no pixels finer than the scene's samples."""
@@ -388,7 +404,7 @@ class SceneModel:
             shape = (ceil(rows / larger), ceil(columns / larger)) if camera.shape else None
             camera = replace(camera, pitch=scene.raster.spacing, shape=shape)
         limits = camera.band.lower, camera.band.upper
-        return replace(camera, band=self._kept(4, "band", limits, lambda: camera.band))
+        return replace(camera, band=self._kept("band", limits, lambda: camera.band))
 
     def _exposed(
         self,
@@ -406,7 +422,6 @@ class SceneModel:
         def make() -> _Exposed:
             spectral = camera.band.lower, camera.band.upper, camera.reflected
             laid = self._kept(
-                4,
                 "laid",
                 (state.key(*_SURFACE), quick, both, () if surface.is_grey else spectral),
                 lambda: [camera.prepare(one, scene) for one in (surface, plain)[: 1 + both]],
@@ -419,12 +434,12 @@ class SceneModel:
 
         key = self._exposure_key(state)
         if quick:
-            return self._kept(24, "quick exposure", (key, both), make)
-        return self._kept(2, "exposure", key, make)
+            return self._kept("quick exposure", (key, both), make)
+        return self._kept("exposure", key, make)
 
     def _scene_panel(self, state: State, exposure: Exposure) -> Panel:
         name = state.study.scene_image
-        scene = self._kept(1, "displayed", "", lambda: with_samples(self.scene, DISPLAYED))
+        scene = self._kept("displayed", "", lambda: with_samples(self.scene, DISPLAYED))
         label, unit, _ = SCENE_IMAGES[name]
         values = self._field(state, name, scene, exposure)
         colours = HEAT if unit == "°C" else PLAIN
@@ -444,7 +459,7 @@ class SceneModel:
             zero = np.float32(ZERO_CELSIUS if SCENE_IMAGES[name][1] == "°C" else 0.0)
             return np.where(void, np.float32(nan), values - zero)
 
-        return self._kept(6, "field", (name, scene.raster.shape, index, surface), make)
+        return self._kept("field", (name, scene.raster.shape, index, surface), make)
 
     def _values(
         self, state: State, name: str, scene: Scene, exposure: Exposure, index: int
@@ -661,7 +676,7 @@ def _crossings(state: State, tool: Tool | None) -> dict[str, float]:
     """Return the distances in µm at which lines enter the tool."""
     found = {}
     for name in LINES if tool is not None else ():
-        line = state.line(name).line(1e-6)
+        line = state.line(name).line(1e-6)  # m between points, finer than a pixel of the figure
         depth = tool.signed_distance(*line.points.T)  # type: ignore[union-attr]
         if depth.min() < 0 < depth.max():
             found[name] = float(1e6 * line.distance[np.abs(depth).argmin()])

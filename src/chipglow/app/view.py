@@ -114,7 +114,7 @@ class PageView:
 
     @property
     def _handlers(self) -> Mapping[str, Callable[[Any], None]]:
-        """What answers a message of the page, by its kind; other kinds are a KeyError."""
+        """Functions that answer messages of the page, by kind; KeyError for other kinds."""
         return {
             "ready": self._on_ready,
             "change": self._on_change,
@@ -362,6 +362,7 @@ def _columns(curves: Mapping[str, Array]) -> dict[str, list[float]]:
 
 def _bars(values: Mapping[Any, float]) -> dict[Any, float]:
     """Return the lengths of bars to both sides in percent of their track."""
+    # 1e-9 K: without an error there is no bar.
     largest = np.nanmax([1e-9, *np.abs(list(values.values()))])
     return {name: 50 * np.nan_to_num(value) / largest for name, value in values.items()}
 

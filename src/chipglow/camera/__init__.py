@@ -25,7 +25,6 @@ from chipglow.camera.chain import (
 from chipglow.camera.description import (
     CameraDescription as CameraDescription,
     CameraSettings as CameraSettings,
-    ChipglowWarning as ChipglowWarning,
 )
 from chipglow.camera.detector.detector import Detector as Detector
 from chipglow.camera.detector.flat_field import (

@@ -1,4 +1,4 @@
-"""Agreement of a camera with a measurement that it is said to have made."""
+"""Agreement of a camera with a measurement attributed to it."""
 
 from typing import Final
 

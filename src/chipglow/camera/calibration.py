@@ -28,6 +28,9 @@ _CHECKED_TEMPERATURES: Final = 101
 _INVERSE_NODES: Final = 513
 """Nodes of the inverse of a calibration."""
 
+_GUESS_POINTS: Final = 501
+"""Wavelengths of the mean and the variance of a band: enough for a first guess."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CalibrationErrors(Brief):
@@ -80,7 +83,7 @@ class CalibrationErrors(Brief):
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrationSettings(MeasuringRange):
-    """What is stated of a calibration beside its numbers."""
+    """Measuring range, warnings and other statements about a calibration."""
 
     warnings: Annotated[
         tuple[str, ...],
@@ -257,7 +260,7 @@ class SakumaHattori(FittedCalibration):
         A = λ (1 − 6 σ²/λ²) and B = c2 σ²/(2 λ²) (P. Saunders and D. R. White, Metrologia 40 (2003)
         195).
         """
-        wavelengths = np.linspace(band.lower, band.upper, 501)
+        wavelengths = np.linspace(band.lower, band.upper, _GUESS_POINTS)
         weights = np.ones_like(wavelengths) if band.response is None else band.response(wavelengths)
         mean = float(np.average(wavelengths, weights=weights))
         relative = float(np.average((wavelengths / mean - 1) ** 2, weights=weights))

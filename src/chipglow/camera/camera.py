@@ -33,11 +33,6 @@ class Camera(CameraDescription):
     ------
     ValueError
         If a value is out of its limits; the message names field, value and limits.
-
-    Warns
-    -----
-    ChipglowWarning
-        If the lower range limit is probably in °C instead of K.
     """
 
     @classmethod
@@ -81,6 +76,15 @@ class Camera(CameraDescription):
     ) -> tuple[Exposure, ...]:
         """Expose the camera to several surfaces from `prepare` in one pass; see `expose`."""
         views = [SpectralView(field, self.band, self.reflected) for field in fields]
+        return self.expose_views(scene, views, start, check)
+
+    def expose_views(
+        self, scene: Scene, views: Sequence[SpectralView], start: float, check: Check | None = None
+    ) -> tuple[Exposure, ...]:
+        """Expose for the camera's integration time and shutter, in one pass, to several views.
+
+        The views may be in other bands and surroundings than the camera's.
+        """
         delays = self.row_delays(scene.raster)
         return expose(scene, views, start, self.integration_time, delays, check)
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera.camera import Camera
 from chipglow.camera.effect import EVERY, Effect
-from chipglow.camera.exposure import Exposure, SpectralView, expose
+from chipglow.camera.exposure import Exposure, SpectralView
 from chipglow.camera.exposure_kernels import Check
 from chipglow.camera.image import form_image, image_formation
 from chipglow.camera.measurement import range_flags
@@ -29,8 +29,8 @@ from chipglow.camera.reference import (
     still_radiance,
     true_kind,
 )
-from chipglow.quantities import Array
-from chipglow.scene import Scene
+from chipglow.quantities import Array, unchecked
+from chipglow.scene import Raster, Scene, sample
 from chipglow.surface import EmissivityField, ModifiedSurface, Surface, UniformSurface
 
 _IMAGES_KEPT: Final = 128
@@ -46,7 +46,7 @@ _Coalition = frozenset[str]
 
 
 class PixelReading(NamedTuple):
-    """What a camera reads: temperatures in K and flags as those of a measurement, each (y, x)."""
+    """Reading of a camera: temperatures in K and flags of a measurement, each (y, x)."""
 
     temperature: Array
     flags: NDArray[np.uint8]
@@ -58,6 +58,19 @@ class Exposures(NamedTuple):
     seen: Exposure
     unreflecting: Exposure
     black: Exposure
+
+
+@dataclass(frozen=True, eq=False)
+class LightBeyond:
+    """Light that reaches the pixels from beyond a part of a scene: it is blurred into the part."""
+
+    image: Array
+    """Radiance in W/(m² sr) on some pixels, (y, x); negative where the edge continues too bright"""
+    pixels: Raster
+
+    def on(self, pixels: Raster) -> Array:
+        """Return the radiance on other pixels, linear between these; 0 beyond them."""
+        return np.nan_to_num(sample(self.image, self.pixels, pixels.centres))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +87,8 @@ class Chain:
         The emissivity.
     field : EmissivityField, optional
         The surface on the scene, from `Camera.prepare`, if it is known.
+    beyond : LightBeyond, optional
+        Light from beyond a scene that is part of another, with all effects.
 
     Examples
     --------
@@ -86,6 +101,7 @@ class Chain:
     scene: Scene
     surface: Surface
     field: EmissivityField | None = None
+    beyond: LightBeyond | None = None
 
     @cached_property
     def emissivity(self) -> EmissivityField:
@@ -124,7 +140,7 @@ class Chain:
         ValueError
             If the scene does not cover the integration time or the pixels.
         """
-        (exposure,) = self.camera.expose_fields(self.scene, (self.emissivity,), start, check)
+        (exposure,) = expose_chains([self], start, check)
         return self.exposed(replace(exposure, effects=self.surface.effects), reference)
 
     def exposed(
@@ -136,8 +152,13 @@ class Chain:
         pixels have in common.
         """
         apart = lru_cache(1)(partial(_exposures, self, exposure))
-        stages = Stages(exposure, apart, shares_blur)
+        stages = Stages(exposure, apart, shares_blur, self.beyond)
         return ExposedChain(self.camera, stages, reference, self.reflects)
+
+    @property
+    def view(self) -> SpectralView:
+        """The surface on the scene in the camera's band and surroundings."""
+        return SpectralView(self.emissivity, self.camera.band, self.camera.reflected)
 
     @property
     def reflects(self) -> bool:
@@ -153,6 +174,7 @@ class Stages:
         exposure: Exposure,
         apart: Callable[[], Exposures] | None = None,
         shares_blur: bool = False,
+        beyond: LightBeyond | None = None,
     ) -> None:
         if not isinstance(exposure, Exposure):
             raise ValueError(
@@ -163,7 +185,7 @@ class Stages:
         sources = partial(_source, exposure, apart)
         blurred = partial(blur, exposure.mean_radiance, spacing=exposure.raster.spacing)
         kept = lru_cache(1)(blurred) if shares_blur else None
-        self.radiance = lru_cache(_IMAGES_KEPT)(partial(_formed, sources, kept))
+        self.radiance = lru_cache(_IMAGES_KEPT)(partial(_formed, sources, kept, beyond))
         self.read = lru_cache(_READINGS_KEPT)(partial(_read, self.radiance, exposure.start))
         self.reference = lru_cache(_READINGS_KEPT)(
             partial(reference_temperature, exposure=exposure)
@@ -172,7 +194,7 @@ class Stages:
 
 @dataclass(frozen=True, eq=False)
 class ExposedChain:
-    """What a camera reads of one exposure with some of its effects switched on.
+    """Readings of a camera in one exposure, with some of its effects switched on.
 
     Effects are members of `Effect`; the kind of a term, such as ``veil`` or ``shot-noise``, names
     one of the terms of `Effect.OPTICS` or `Effect.DETECTOR`. Switched off, an effect is ideal:
@@ -191,13 +213,18 @@ class ExposedChain:
         """The exposure with all effects."""
         return self.stages.exposure
 
+    @property
+    def pixels(self) -> Raster:
+        """The pixels on the scene."""
+        return self.camera.pixels(self.exposure.raster)
+
     def through(self, camera: Camera) -> "ExposedChain":
         """Return the chain with another camera of the same band and integration time."""
         return replace(self, camera=camera)
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """Effects that are there, in the order of the light."""
+        """Effects that are present, in the order of the light."""
         camera, detector = self.camera, self.camera.detector
         absent = {
             Effect.REFLECTION: not self.reflects,
@@ -217,7 +244,9 @@ class ExposedChain:
 
     def reference(self, kind: ReferenceKind | None = None) -> Array:
         """Return the temperature in K of pixels without error; NaN where nothing radiates."""
-        pixels_alone = replace(self.camera, psf=None, psf_order="optics", optics=(), detector=None)
+        pixels_alone = unchecked(
+            self.camera, psf=None, psf_order="optics", optics=(), detector=None
+        )
         return self.stages.reference(pixels_alone, kind=kind or self.reference_kind)
 
     def radiance(self, on: Collection[str] = EVERY) -> Array:
@@ -254,7 +283,10 @@ class ExposedChain:
 
     def stack(self, effects: Mapping[str, Collection[str]]) -> Array:
         """Return the reference, then the readings with each set of effects, (row, y, x)."""
-        return np.stack([self.reference(), *(self.reading(on) for on in effects.values())])
+        reference = self.reference()
+        is_dark = np.isnan(reference)
+        readings = (self.read(on).temperature for on in effects.values())
+        return np.stack([reference, *(np.where(is_dark, np.nan, one) for one in readings)])
 
     def waterfall(self, order: Sequence[Collection[str]]) -> Array:
         """Return the change of the reading in K by each set of effects in turn, (set, y, x).
@@ -290,7 +322,7 @@ class ExposedChain:
         return self.terms_of(Effect.OPTICS) | self.terms_of(Effect.DETECTOR)
 
     def _without_detector(self, on: _Coalition) -> Camera:
-        return replace(self._switched(on), detector=None)
+        return unchecked(self._switched(on), detector=None)
 
     def _switched(self, on: _Coalition) -> Camera:
         """Return the camera with the parts and terms that act."""
@@ -301,7 +333,8 @@ class ExposedChain:
             if Effect.DIGITISER not in on:
                 detector = detector.undigitised() if terms else None
         psf = camera.psf if Effect.PSF in on else None
-        return replace(
+        # Parts of a camera that is possible are checked; a check takes longer than a small image.
+        return unchecked(
             camera,
             psf=psf,
             # Without a PSF its order does not matter; one value lets cameras share the image.
@@ -315,10 +348,8 @@ def expose_chains(
     chains: Sequence[Chain], start: float, check: Check | None = None
 ) -> tuple[Exposure, ...]:
     """Expose chains of a scene in one pass; their cameras may differ in the band alone."""
-    camera = chains[0].camera
-    delays = camera.row_delays(chains[0].scene.raster)
-    views = [SpectralView(one.emissivity, one.camera.band, one.camera.reflected) for one in chains]
-    return expose(chains[0].scene, views, start, camera.integration_time, delays, check)
+    first = chains[0]
+    return first.camera.expose_views(first.scene, [one.view for one in chains], start, check)
 
 
 def chains_in_bands(surface: Surface, scene: Scene, cameras: Sequence[Camera]) -> tuple[Chain, ...]:
@@ -340,7 +371,7 @@ def expose_apart(
     chain: Chain, start: float, reference: ReferenceKind = "maximum", check: Check | None = None
 ) -> ExposedChain:
     """Expose once, with the effects of the surface switched off too, in one pass."""
-    exposures = _in_one_pass(chain, _views(chain), start, check)
+    exposures = chain.camera.expose_views(chain.scene, _views(chain), start, check)
     stages = Stages(exposures[0], lambda: Exposures(*exposures))
     return ExposedChain(chain.camera, stages, reference, chain.reflects)
 
@@ -371,6 +402,7 @@ def _source(exposure: Exposure, apart: Callable[[], Exposures] | None, name: str
 def _formed(
     source: Callable[[str], Exposure],
     blurred: Callable[[PointSpreadFunction], Array] | None,
+    beyond: LightBeyond | None,
     camera: Camera,
     name: str,
     moves: bool,
@@ -384,17 +416,21 @@ def _formed(
     is_common = blurred is not None and name == "seen" and moves and has_footprint
     if is_common and psf and camera.psf_order == "optics" and "footprint" not in psf.includes:
         assert blurred is not None
-        radiance, camera = blurred(psf), replace(camera, psf=None)
-    return form_image(camera, radiance, exposure.raster, gather)
+        radiance, camera = blurred(psf), unchecked(camera, psf=None)
+    image = form_image(camera, radiance, exposure.raster, gather)
+    if beyond is None:
+        return image
+    return np.maximum(image + beyond.on(camera.pixels(exposure.raster)), 0.0)
 
 
 def _read(formed: Callable[..., Array], start: float, camera: Camera, *how: object) -> PixelReading:
-    undetected = replace(camera, detector=None) if camera.detector else camera
+    undetected = unchecked(camera, detector=None) if camera.detector else camera
     return read_temperature(camera, formed(undetected, *how), start)
 
 
 def _exposures(chain: Chain, seen: Exposure) -> Exposures:
-    return Exposures(seen, *_in_one_pass(chain, _views(chain)[1:], seen.start))
+    others = chain.camera.expose_views(chain.scene, _views(chain)[1:], seen.start)
+    return Exposures(seen, *others)
 
 
 def _views(chain: Chain) -> list[SpectralView]:
@@ -402,18 +438,10 @@ def _views(chain: Chain) -> list[SpectralView]:
     scene, band = chain.scene, chain.camera.band
     plain = _unreflecting(chain.surface)
     return [
-        SpectralView(chain.emissivity, band, chain.camera.reflected),
+        chain.view,
         SpectralView(plain.prepare(scene, band), band),
         SpectralView(UniformSurface(1.0).prepare(scene, band), band),
     ]
-
-
-def _in_one_pass(
-    chain: Chain, views: Sequence[SpectralView], start: float, check: Check | None = None
-) -> tuple[Exposure, ...]:
-    camera, scene = chain.camera, chain.scene
-    delays = camera.row_delays(scene.raster)
-    return expose(scene, views, start, camera.integration_time, delays, check)
 
 
 def _unreflecting(surface: Surface) -> Surface:

@@ -2,8 +2,7 @@
 
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import partial
-from typing import Annotated, Final, Literal, Self
-from warnings import warn
+from typing import Annotated, Literal, Self
 
 import numpy as np
 
@@ -19,18 +18,11 @@ from chipglow.camera.optics.blurs import BLURS
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import sensor_raster
 from chipglow.camera.optics.terms import OPTICS_TERMS, OpticsTerm
-from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, made_from
+from chipglow.quantities import Array, Parameter, made_from
 from chipglow.quantities.units import LENGTH, TIME, Position
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import PAPER_BAND
 from chipglow.scene import Raster
-
-_SUSPECT_LIMIT: Final = 373.15
-"""Lower range limits in K that are probably meant in °C, if round."""
-
-
-class ChipglowWarning(UserWarning):
-    """A valid setting that is probably a mistake, such as °C instead of K."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +30,7 @@ class CameraSettings(ExposureSettings):
     """Settings of a camera that a study states as `Camera` takes them."""
 
     pitch: Annotated[
-        float, Parameter("Distance between pixels on the scene.", LENGTH, most=1e-2)
+        float, Parameter("Distance between pixels on the scene.", LENGTH, least=1e-8, most=1e-2)
     ] = 6e-6
     psf_order: Annotated[
         Literal["optics", "detector"],
@@ -149,18 +141,6 @@ class CameraDescription(CameraSettings):
             raise ValueError(
                 f"Camera.lower_limit: {self.lower_limit:g} K must be below the upper end of the "
                 f"range, {response.hottest:g} K (detector.response.hottest)"
-            )
-        if (
-            self.lower_limit is not None
-            and self.lower_limit <= _SUSPECT_LIMIT
-            and self.lower_limit % 10 == 0
-        ):
-            warn(
-                f"camera: lower_limit is {self.lower_limit:g} K, which is "
-                f"{self.lower_limit - ZERO_CELSIUS:g} °C. If {self.lower_limit:g} °C is meant, "
-                f"write {self.lower_limit + ZERO_CELSIUS:g} K.",
-                ChipglowWarning,
-                stacklevel=3,
             )
 
     def pixels(self, scene: Raster) -> Raster:

@@ -5,7 +5,7 @@ from typing import Final
 
 
 class Effect(StrEnum):
-    """What makes the reading of a camera differ from the true temperature.
+    """Cause of a difference between the reading of a camera and the true temperature.
 
     The members are in the order in which the light meets the effects, and are texts, so that YAML,
     tables and files use the same names.

@@ -64,8 +64,8 @@ def image_formation(
     """Return the linear map from the radiance of samples to the radiance of the pixels.
 
     It has an adjoint, for corrections of measured images. Radiance beyond the samples continues as
-    at the edge, or is none; `gather` is as in `form_image`. The pixels are those of the camera on
-    the samples, unless stated.
+    at the edge, or is zero; `gather` is as in `form_image`. By default the camera determines the
+    pixels.
     """
     return ImageFormation(
         samples,

@@ -7,7 +7,7 @@ import numpy as np
 
 from chipglow.camera.description import CameraDescription
 from chipglow.camera.detector.terms import EquivalentNoise, Lag, follows
-from chipglow.quantities import ZERO_CELSIUS, Array
+from chipglow.quantities import ROUNDING, ZERO_CELSIUS, Array
 from chipglow.scene import Raster
 
 BORDER_TOLERANCE: Final = 1.0
@@ -16,14 +16,28 @@ BORDER_TOLERANCE: Final = 1.0
 _FEWEST_SAMPLES: Final = 2.0
 """Samples of the scene in the width of a pixel."""
 
+_SUSPECT_LIMIT: Final = 373.15
+"""Lower range limits in K that are probably meant in °C, if they are multiples of 10."""
+
 
 def sampling_warning(camera: CameraDescription, scene: Raster) -> Iterator[str]:
     """Yield a warning if the scene's samples are too coarse for blur and footprint."""
-    if camera.pitch < _FEWEST_SAMPLES * scene.spacing * (1 - 1e-9):
+    if camera.pitch < _FEWEST_SAMPLES * scene.spacing * (1 - ROUNDING):
         yield (
             f"The scene's samples are {1e6 * scene.spacing:.3g} µm wide, more than half a "
             f"pixel of {1e6 * camera.pitch:.3g} µm: what changes within a sample is missing, and "
             "the errors by pixels and blur may be too small."
+        )
+
+
+def limit_warning(camera: CameraDescription) -> Iterator[str]:
+    """Yield a warning if the lower range limit is probably in °C instead of K."""
+    limit = camera.lower_limit
+    # A limit that was meant in °C is a round number.
+    if limit is not None and limit <= _SUSPECT_LIMIT and limit % 10 == 0:
+        yield (
+            f"The lower range limit of {limit:g} K is {limit - ZERO_CELSIUS:g} °C. If "
+            f"{limit:g} °C is meant, write {limit + ZERO_CELSIUS:g} K."
         )
 
 

@@ -14,6 +14,7 @@ from chipglow.camera.measurement import Measurement
 from chipglow.camera.measurement_warnings import (
     border_warning,
     lag_warning,
+    limit_warning,
     rounding_warning,
     sampling_warning,
 )
@@ -43,6 +44,7 @@ def form_measurement(
     measured = measurement_of(camera, np.stack(images), np.array(starts), scene)
     measured.data.attrs.update(sorted(set.intersection(*effects)))
     warnings |= dict.fromkeys(sampling_warning(camera, scene))
+    warnings |= dict.fromkeys(limit_warning(camera))
     warnings |= dict.fromkeys(rounding_warning(camera, images[0].shape))
     warnings |= dict.fromkeys(lag_warning(camera, measured.times))
     warnings |= dict.fromkeys(border_warning(camera, np.stack(images), np.stack(similar), scene))

@@ -16,7 +16,7 @@ from chipglow.chip.segmentation import (
     segmentation,
 )
 from chipglow.chip.shear_band import ShearBand
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import ROUNDING, Array, Brief
 from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 
@@ -40,6 +40,9 @@ _WHOLE: Final = 0.9
 
 _DEVELOPED: Final = 0.5
 """Strain rate of a developed band as a fraction of the largest."""
+
+_CHIP_POINTS: Final = 33
+"""Points across the middle half of the chip at which speed and strain are read."""
 
 _FORCES: Final = ("cutting_mean", "cutting_swing", "thrust_mean", "thrust_swing")
 """Metrics that a `CutHistory` states."""
@@ -161,6 +164,7 @@ def _measured(
     """Return the chip's thickness at the heights in m, its contact, feed and cutting speed."""
     solid = frame.material == Material.WORKPIECE
     contact = contact_length(raster, solid, tool, _CONTACT_DISTANCE)
+    # Three samples beyond the contact must be in the image, or it may continue outside.
     end = tool.rake_point(contact + 3 * raster.spacing) + _CONTACT_DISTANCE * np.array(
         tool.rake_normal
     )
@@ -189,7 +193,7 @@ def _passing(
     if not windows:
         return {"thickness": nan, "band_strain": nan, **_with_deviation("chip_speed", [])}
     valleys = [scan.thickness[window].min() for window in windows]
-    depth = np.linspace(0.25, 0.75, 33) * float(np.mean(valleys))
+    depth = np.linspace(0.25, 0.75, _CHIP_POINTS) * float(np.mean(valleys))
     points = tool.rake_point(scan.height) + depth[:, None] * np.array(tool.rake_normal)
     right, up, strain = (
         np.stack([sample(scene.field(name, k), scene.raster, points) for k in frames])
@@ -208,6 +212,7 @@ def _passing(
 
 def _heights(raster: Raster, tool: Tool) -> Array:
     """Return heights on the rake face in the view, at steps of two samples."""
+    # A rake face that is tilted by up to 48° (cos = 1/1.5) crosses the whole image.
     heights = np.arange(0.0, raster.rows * raster.spacing * 1.5, 2 * raster.spacing)
     return heights[: max(1, int(_inside(raster, tool.rake_point(heights)).sum()))]
 
@@ -259,7 +264,7 @@ def _windows(time: Array, period: float) -> list[NDArray[np.bool_]]:
     end = time[-1] + (time[-1] - time[0]) / max(time.size - 1, 1)
     count = int((end - time[0]) / period + 1 - _WHOLE)
     before_end = (end - time) / period
-    return [(before_end > k + 1e-9) & (before_end <= k + 1 + 1e-9) for k in range(count)]
+    return [(before_end > k + ROUNDING) & (before_end <= k + 1 + ROUNDING) for k in range(count)]
 
 
 def _developed_bands(scene: Scene, frames: list[int]) -> list[ShearBand]:

@@ -32,7 +32,7 @@ _STRAIGHTNESS: Final = 0.2
 """Price of a path's slope, in units of the score."""
 
 _RAKE_LAYER: Final = 25e-6
-"""Thickness in m of the layer on the rake face, whose friction is no band."""
+"""Thickness in m of the friction layer on the rake face, which is not a shear band."""
 
 _RAKE_LAYER_SHARE: Final = 0.4
 """Thickness of this layer as a fraction of the radius, near the edge."""
@@ -43,6 +43,9 @@ does."""
 
 _SMOOTHING: Final = 50e-6
 """Length in m over which a curve is smoothed."""
+
+_FEWEST_POINTS: Final = 5
+"""Fewest points of a curve, and of a parabola that smooths it: two more than a parabola needs."""
 
 _WEAK: Final = 0.5
 """Fraction of a path's median strength below which there is no ridge."""
@@ -75,6 +78,7 @@ class PolarGrid:
         """Return the grid about a tool's edge that covers a raster."""
         edge = tool.edge_point
         left, right, _, top = raster.extent
+        # At least 1 µm upward, for an edge above the image.
         reach = float(np.hypot(max(edge[0] - left, right - edge[0]), max(top - edge[1], 1e-6)))
         step = max(_RADIUS_STEP, raster.spacing / _STEPS_A_SAMPLE)
         radii = np.arange(max(tool.corner_radius, step), reach + 2 * step, step)
@@ -160,10 +164,10 @@ def strongest_part(points: Array, strength: Array, longest: float) -> slice:
 def even_steps(points: Array, step: float) -> Array:
     """Resample a curve at even steps of arc length in m and smooth it by local parabolas."""
     along = arc_length(points)
-    even = np.linspace(0.0, along[-1], max(ceil(along[-1] / step) + 1, 5))
+    even = np.linspace(0.0, along[-1], max(ceil(along[-1] / step) + 1, _FEWEST_POINTS))
     resampled = np.stack([np.interp(even, along, points[:, axis]) for axis in (0, 1)], axis=1)
     window = min(2 * round(_SMOOTHING / step / 2) + 1, (even.size - 1) // 2 * 2 + 1)
-    if window < 5:
+    if window < _FEWEST_POINTS:
         return resampled
     return np.asarray(scipy.signal.savgol_filter(resampled, window, 2, axis=0), np.float64)
 

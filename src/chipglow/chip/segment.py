@@ -14,6 +14,9 @@ from chipglow.quantities import Array, Brief
 from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 
+_SWEEP_REACH: Final = 40e-6
+"""Distance in m from the band's middle within which its motion is followed."""
+
 _LONGEST_GAP: Final = 12e-6
 """Longest gap in m within a contact."""
 
@@ -30,6 +33,7 @@ def contact_length(
     along = np.arange(0.0, np.hypot(raster.rows, raster.columns) * raster.spacing, step)
     foot = tool.rake_point(along)
     touches = np.zeros(along.size, dtype=np.bool_)
+    # Lines half a sample apart miss no sample; the first is within the samples on the face.
     for height in np.arange(raster.spacing / 4, touching + step, step):
         touches |= nearest(workpiece, raster, foot + height * np.array(tool.rake_normal)) == 1
     contacts = along[touches]
@@ -133,7 +137,7 @@ def shear_band(
 
 def _sweep(scene: Scene, indices: range, band: ShearBand) -> float:
     """Return the travel of the largest strain rate on the line across the band's middle."""
-    line = band.across(40e-6, scene.raster.spacing / 2)
+    line = band.across(_SWEEP_REACH, scene.raster.spacing / 2)
     places = []
     for index in (indices[0], indices[-1]):
         rate = scene.field("plastic_strain_rate", index)

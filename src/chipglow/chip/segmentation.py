@@ -56,8 +56,9 @@ def segmentation(time: ArrayLike, thickness: ArrayLike, resolution: float) -> Se
     known = np.isfinite(np.asarray(thickness, np.float64))
     times, values = np.asarray(time, np.float64)[known], np.asarray(thickness, np.float64)[known]
     if times.size < 2:
-        return Segmentation(np.zeros(0), np.zeros(0), *[nan] * 8)
+        return Segmentation(np.zeros(0), np.zeros(0), *[nan] * 8)  # no segment: unknown numbers
     smooth = gaussian_filter1d(values, _SMOOTH / float(np.median(np.diff(times))), mode="nearest")
+    # Percentiles, because single extremes change the range.
     least = max(resolution, _STANDING_OUT * float(np.ptp(np.percentile(smooth, [5, 95]))))
     tops = scipy.signal.find_peaks(smooth, prominence=least)[0]
     bottoms = np.array([a + smooth[a:b].argmin() for a, b in pairwise(tops)], np.int64)

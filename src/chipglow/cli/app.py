@@ -2,9 +2,9 @@
 
 import gc
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final, TypeAlias
 
 import typer
 
@@ -34,38 +34,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 cache_app = typer.Typer(help="List or delete cached scenes.", no_args_is_help=True)
-app.add_typer(cache_app, name="cache")
-
-EXAMPLES = {
-    "reproduce": "--quick --out results",
-    "init": "study.yaml",
-    "run": "study.yaml --out results",
-    "error": "scene.nc --emissivity 0.7 --out results",
-    "band": "--width 20um --rise 300K --speed 4m/s --camera study.yaml --plot band.png",
-    "cut": "study.yaml --out scene.nc",
-    "import": "'chip_*.vtu' --set units.length=mm --set interval=1us --out scene.nc",
-    "correct": "measured.nc --study study.yaml --out corrected.nc --plot corrected.png",
-    "measure": "scene.nc --study study.yaml --chip 'chip 2' --out measured.nc",
-    "wavelengths": "study.yaml --plot bands.png",
-    "sweep": "study.yaml --vary camera.integration_time=2us,5us,10us --out sweep",
-    "budget": "study.yaml --at 'rake face' --out budget.csv --plot budget.png",
-    "design": "study.yaml --vary camera.integration_time=2us,5us,10us --at 'rake face'",
-    "show": "measured.nc --plot measured.png",
-    "app": "scene.nc",
-    "materials": "aisi-1045",
-    "cameras": "flir-a6751",
-    "doctor": "",
-    "calibrate": "points.csv --band 3.8-5.1um --integration-time 10us --out calibration.yaml",
-    "convert": "chip.hcc --set 'pitch=6 um' --set calibration=calibration.yaml --out chip.nc",
-    "emissivity": "chip.nc --regions regions.yaml --reference 391degC --out emissivity.nc",
-    "temperature": "chip.nc --regions regions.yaml --emissivity emissivity.nc",
-    "psf": "edge.nc --out psf.nc --plot psf.png",
-    "register": "infrared.nc visible.png --points points.csv --out map.yaml",
-    "rake": "chip.nc --tool found --out rake.csv",
-    "shearband": "chip.nc --plot band.png",
-    "compare": "measured.nc chip-1.nc chip-2.nc --out comparison",
-}
-"""Arguments of an example of each command, the last line of its help."""
 
 
 def main() -> None:
@@ -113,10 +81,6 @@ def _chipglow(
     pass
 
 
-app.command()(reproduce)
-
-
-@app.command()
 def init(
     path: Annotated[Path, opt.argument("STUDY", "File to write.", writable=True)] = Path(
         "study.yaml"
@@ -153,19 +117,6 @@ def init(
     current().file(path)
 
 
-app.command()(run)
-app.command()(error)
-app.command()(band)
-app.command()(cut)
-app.command("import")(import_source)
-app.command()(measure)
-app.command()(wavelengths)
-app.command()(sweep)
-app.command()(budget)
-app.command()(design)
-
-
-@app.command()
 def show(
     file: Annotated[Path, opt.argument("FILE", "Scene or measurement, a NetCDF file.")],
     at: Annotated[
@@ -179,7 +130,6 @@ def show(
     show_file(file, at, plot)
 
 
-@app.command("app")
 def open_app(
     path: Annotated[
         Path | None,
@@ -218,11 +168,6 @@ def open_app(
     serve(path, address, port, announce)
 
 
-app.command()(materials)
-app.command()(cameras)
-
-
-@app.command()
 def doctor() -> None:
     """Check the installation and run a numerical self-test."""
     from chipglow.cli.doctor import examine
@@ -230,19 +175,7 @@ def doctor() -> None:
     examine()
 
 
-for command in (
-    calibrate, convert, emissivity, temperature, correct, psf, register, rake, shearband, compare,
-):  # fmt: skip
-    app.command(rich_help_panel="The laboratory")(command)
-
-
-for registered in app.registered_commands:
-    title = registered.name or registered.callback.__name__  # type: ignore[union-attr]
-    registered.epilog = f"Example: chipglow {title} {EXAMPLES[title]}"
-
-
-@cache_app.command("list")
-def list_cache() -> None:
+def list_cached() -> None:
     """List the cached scenes, the latest first, with their sizes."""
     from datetime import datetime
 
@@ -258,8 +191,7 @@ def list_cache() -> None:
     screen.values({"scenes": {str(scene.path): scene.size for scene in scenes}, "bytes": total})
 
 
-@cache_app.command("clear")
-def clear() -> None:
+def clear_cached() -> None:
     """Delete the cached scenes."""
     from chipglow.study import cache_folder, clear_cache
 
@@ -269,3 +201,61 @@ def clear() -> None:
 
 def _megabytes(size: int) -> str:
     return f"{size / 1e6:.1f} MB"
+
+
+_Commands: TypeAlias = Mapping[str, tuple[Callable[..., None], str]]
+"""Commands by name, each with the arguments of its example, the last line of its help."""
+
+COMMANDS: Final[_Commands] = {
+    "reproduce": (reproduce, "--quick --out results"),
+    "init": (init, "study.yaml"),
+    "run": (run, "study.yaml --out results"),
+    "error": (error, "scene.nc --emissivity 0.7 --out results"),
+    "band": (band, "--width 20um --rise 300K --speed 4m/s --camera study.yaml --plot band.png"),
+    "cut": (cut, "study.yaml --out scene.nc"),
+    "import": (
+        import_source,
+        "'chip_*.vtu' --set units.length=mm --set interval=1us --out scene.nc",
+    ),
+    "measure": (measure, "scene.nc --study study.yaml --chip 'chip 2' --out measured.nc"),
+    "wavelengths": (wavelengths, "study.yaml --plot bands.png"),
+    "sweep": (sweep, "study.yaml --vary camera.integration_time=2us,5us,10us --out sweep"),
+    "budget": (budget, "study.yaml --at 'rake face' --out budget.csv --plot budget.png"),
+    "design": (design, "study.yaml --vary camera.integration_time=2us,5us,10us --at 'rake face'"),
+    "show": (show, "measured.nc --plot measured.png"),
+    "app": (open_app, "scene.nc"),
+    "materials": (materials, "aisi-1045"),
+    "cameras": (cameras, "flir-a6751"),
+    "doctor": (doctor, ""),
+}
+
+LABORATORY: Final[_Commands] = {
+    "calibrate": (
+        calibrate,
+        "points.csv --band 3.8-5.1um --integration-time 10us --out calibration.yaml",
+    ),
+    "convert": (
+        convert,
+        "chip.hcc --set 'pitch=6 um' --set calibration=calibration.yaml --out chip.nc",
+    ),
+    "emissivity": (
+        emissivity,
+        "chip.nc --regions regions.yaml --reference 391degC --out emissivity.nc",
+    ),
+    "temperature": (temperature, "chip.nc --regions regions.yaml --emissivity emissivity.nc"),
+    "correct": (correct, "measured.nc --study study.yaml --out corrected.nc --plot corrected.png"),
+    "psf": (psf, "edge.nc --out psf.nc --plot psf.png"),
+    "register": (register, "infrared.nc visible.png --points points.csv --out map.yaml"),
+    "rake": (rake, "chip.nc --tool found --out rake.csv"),
+    "shearband": (shearband, "chip.nc --plot band.png"),
+    "compare": (compare, "measured.nc chip-1.nc chip-2.nc --out comparison"),
+}
+
+for panel, commands in ((None, COMMANDS), ("The laboratory", LABORATORY)):
+    for name, (command, example) in commands.items():
+        epilog = f"Example: chipglow {name} {example}"
+        app.command(name, rich_help_panel=panel, epilog=epilog)(command)
+
+cache_app.command("list")(list_cached)
+cache_app.command("clear")(clear_cached)
+app.add_typer(cache_app, name="cache")

@@ -45,7 +45,7 @@ def many_files(files: Sequence[Path]) -> Iterator[Iterator[Path]]:
 
 
 def for_each(files: Sequence[Path], make: Callable[[Path], Made]) -> dict[Path, Made]:
-    """Return what a function makes of each file; a ValueError at the end names those it cannot."""
+    """Return the result of a function for each file; a ValueError at the end names the failures."""
     made: dict[Path, Made] = {}
     failed: dict[Path, str] = {}
     with many_files(files) as shown:

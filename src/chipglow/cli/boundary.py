@@ -11,15 +11,21 @@ from typer.core import TyperGroup
 from chipglow.cli import options as opt, screen, streams
 
 BAD_INPUT: Final = 2
-"""Exit status after invalid input, as of Click."""
+"""Exit status after invalid input; Click uses the same."""
 
 FAILED: Final = 1
 """Exit status after a failure."""
 
 INTERRUPTED: Final = 130
-"""Exit status after Ctrl-C, as of shells: 128 and the number of the signal."""
+"""Exit status after Ctrl-C. Shells use the same: 128 plus the number of the signal."""
+
+_LONGEST_MESSAGE: Final = 2000
+"""Characters of an error that are shown; a longer one quotes a value of the input."""
 
 _NO_THREAD: Final = "can't start new thread"
+_NO_ROOM: Final = "failed to map segment"
+"""Message of the system if a limit of memory leaves no room for a library."""
+
 _FEWER: Final = "end other programs, raise the limit (ulimit -u), or set OMP_NUM_THREADS=1"
 _SMALLER: Final = "choose fewer or coarser samples, or end other programs"
 
@@ -59,6 +65,10 @@ class Boundary(TyperGroup):
             raise _ended(f"{error.param.opts[0]}: {message}", BAD_INPUT) from None
         except (ValueError, OSError) as error:
             raise _ended(_one_line(error), BAD_INPUT) from None
+        except OverflowError as error:
+            raise _ended(f"a number is too large: {_one_line(error)}", BAD_INPUT) from None
+        except RecursionError:
+            raise _ended("the input is nested too deeply", BAD_INPUT) from None
         except KeyboardInterrupt as error:
             kept = (
                 f"{error}: --resume continues from there" if str(error) else "nothing was written"
@@ -69,6 +79,10 @@ class Boundary(TyperGroup):
                 ": ".join(filter(None, ("not enough memory", _one_line(error)))) + f"; {_SMALLER}",
                 FAILED,
             ) from None
+        except ImportError as error:
+            if _NO_ROOM not in str(error):
+                raise
+            raise _ended(f"not enough memory to load a library; {_SMALLER}", FAILED) from None
         except RuntimeError as error:
             from chipglow.cutting import SolverError
 
@@ -90,7 +104,8 @@ def _one_line(error: Exception) -> str:
     text = str(error)
     if isinstance(error, OSError) and error.strerror:
         text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    return " ".join(text.split())
+    line, half = " ".join(text.split()), _LONGEST_MESSAGE // 2
+    return line if len(line) <= _LONGEST_MESSAGE else f"{line[:half]} … {line[-half:]}"
 
 
 def _complete(group: TyperGroup, option: Any) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from chipglow.cli import options as opt
+from chipglow.cli.image_part import part_in_pixels
 from chipglow.cli.screen import current, figure, finish
 
 if TYPE_CHECKING:
@@ -60,7 +61,9 @@ def calibrate(
     ] = None,
     region: Annotated[
         str | None,
-        opt.value("ROWS,COLUMNS", "Part of the recordings that shows the blackbody: 10:70,20:90."),
+        opt.value(
+            "COLUMNS,ROWS", "Part of the recordings that shows the blackbody, e.g. 20:90,10:70."
+        ),
     ] = None,
     settings: opt.Settings = None,
 ) -> None:
@@ -88,7 +91,7 @@ def calibrate(
         common_uncertainty=common_uncertainty,
         integration_time=integration_time,
         range_name=range_name,
-        region=_region(region),
+        region=part_in_pixels("--region", region),
     )
     for name in result.fits:
         _print_fit(result, name)
@@ -153,7 +156,7 @@ def psf(
     ] = None,
     region: Annotated[
         str | None,
-        opt.value("ROWS,COLUMNS", "Part of the images with only the edge, e.g. 10:70,20:90."),
+        opt.value("COLUMNS,ROWS", "Part of the images with only the edge, e.g. 20:90,10:70."),
     ] = None,
     model: Annotated[
         str | None,
@@ -174,7 +177,7 @@ def psf(
     from chipglow.laboratory.psf.figure import sentences
     from chipglow.laboratory.recordings import load_measurement
 
-    window = _region(region)
+    window = part_in_pixels("--region", region)
     images = [lab.load_edge(path, settings or (), window) for path in edges]
     holes = [
         lab.aperture_image(load_measurement(path, settings or ()), diameter, path.name)
@@ -197,19 +200,3 @@ def psf(
         (out, lambda path: lab.write_psf(result, path, kernel)),
         (plot, figure(result.plot)),
     )
-
-
-def _region(text: str | None) -> tuple[slice, slice]:
-    """Parse rows and columns such as 10:70,20:90; all without a text."""
-    if text is None:
-        return slice(None), slice(None)
-    try:
-        rows, columns = (
-            slice(*(int(number) if number.strip() else None for number in part.split(":")))
-            for part in text.split(",")
-        )
-    except (ValueError, TypeError):
-        raise ValueError(
-            f"--region: {text!r}, expected rows and columns such as 10:70,20:90"
-        ) from None
-    return rows, columns

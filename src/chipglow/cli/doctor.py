@@ -113,10 +113,11 @@ def _installed(name: str) -> str | None:
 
 def _radiance_difference(temperature: float) -> float:
     """Return the relative difference of the compiled radiance from Planck's law."""
+    # First (per solid angle) and second radiation constant in W m²/sr and m K, CODATA 2018.
     c1, c2 = 1.191042972e-16, 0.01438776877
 
     def planck(wavelength: float) -> float:
         return c1 / wavelength**5 / expm1(c2 / (wavelength * temperature))
 
-    exact = quad(planck, *_BAND, epsrel=1e-10)[0]
+    exact = quad(planck, *_BAND, epsrel=1e-10)[0]  # far below `_TOLERANCE`
     return float(abs(Band(*_BAND).radiance(temperature) / exact - 1.0))

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from errno import ELOOP
 from glob import glob, has_magic
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,14 +20,19 @@ _LISTS: Final = {
 _LARGEST_LIST: Final = 1_000_000
 """Bytes of a list that are searched for names; longer files hold numbers."""
 
+_MOST_ENTRIES: Final = 10_000
+"""Files of a folder that are examined: a Zarr store of 100 frames has up to some thousands."""
+
 _BETWEEN_NAMES: Final = re.compile(r"[\s,;=\"'<>{}()]+")
 
 
 def named_files(values: Iterable[Any]) -> list[Path]:
     """Return the existing files that values of parameters name, and those named in these files.
 
+    Folders are returned; those that a value names as a whole are searched for special files.
+
     A name may be a pattern, a part of a setting such as ``flat_field.low=low.tif``, an entry of a
-    YAML file, or a cell of a table. Folders are returned, not searched.
+    YAML file, or a cell of a table.
 
     Raises
     ------
@@ -34,7 +40,10 @@ def named_files(values: Iterable[Any]) -> list[Path]:
         If a file is a pipe, a socket, a device or a loop of links.
     """
     found: dict[Path, None] = {}
-    waiting = [path for text in _texts(list(values)) for path in _typed(text)]
+    texts = list(_texts(list(values)))
+    for text in texts:
+        _check_folder(text)
+    waiting = [path for text in texts for path in _typed(text)]
     while waiting:
         path = waiting.pop()
         if path not in found:
@@ -42,6 +51,18 @@ def named_files(values: Iterable[Any]) -> list[Path]:
             found[path] = None
             waiting += _named_in(path)
     return list(found)
+
+
+def _check_folder(text: str) -> None:
+    """Refuse a folder with a pipe, a socket or a device, at which its reader could wait for ever.
+
+    Such as a Zarr store or a case of OpenFOAM.
+    """
+    with suppress(OSError, ValueError):  # text that is no name, or a folder that others change
+        if not text or not Path(text).is_dir():
+            return
+    for path in islice(Path(text).rglob("*"), _MOST_ENTRIES):
+        check_regular(path)
 
 
 def _texts(value: Any) -> Iterator[str]:

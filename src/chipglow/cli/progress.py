@@ -15,12 +15,16 @@ from chipglow.cli.screen import current
 from chipglow.study import (
     Progress as Report,
     Study,
+    check_cost,
     expected_cost,
     is_cut,
     is_damaged,
     kept_progress,
 )
 from chipglow.text import Notes
+
+_LONG: Final = 90.0
+"""Seconds above which a time is stated in minutes."""
 
 _MARGIN: Final = 4
 """Columns that a bar leaves free."""
@@ -45,11 +49,12 @@ def confirm_cost(study: Study, resume: bool, agreed: bool) -> None:
         return
     if is_damaged(study):
         console.print("The cached scene of this cut is damaged; it is computed again.")
+    check_cost(study)
     kept = kept_progress(study)
     say_checkpoint("cut", kept, resume)
     cost = expected_cost(study)
     seconds = (1 - kept if resume else 1.0) * cost.seconds
-    time = f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
+    time = f"{seconds / 60:.0f} min" if seconds > _LONG else f"{seconds:.0f} s"
     console.print(
         f"Expected: about {time}, {cost.disk / 1e9:.2g} GB in the cache, {cost.memory / 1e9:.2g} "
         "GB of memory."

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 import typer
 
 from chipglow.cli import options as opt
+from chipglow.cli.image_part import part_in_scene
 from chipglow.cli.screen import current, figure, finish
 
 if TYPE_CHECKING:
@@ -54,9 +55,9 @@ def register(
     align: Annotated[
         str | None,
         opt.value(
-            "REGION",
-            "Also find the clock offset from the mean brightness of a region (left, bottom, right, "
-            "top), e.g. '-90 um, 20 um, -10 um, 120 um'.",
+            "X,Y",
+            "Also find the clock offset from the mean brightness of a part of the scene, e.g. "
+            "'-90um:-10um,20um:120um'.",
         ),
     ] = None,
     visible_interval: Annotated[
@@ -85,7 +86,7 @@ def register(
         raise ValueError("--pairs requires --align")
     if [points is not None, dots, known is not None].count(True) != 1:
         raise ValueError("expected one of --points FILE, --dots and --map FILE")
-    region = None if align is None else _region(align)
+    region = None if align is None else part_in_scene("--align", align)
     if region and visible_interval is None and visible.suffix.lower() in PICTURE_SUFFIXES:
         raise ValueError(f"--align requires --visible-interval: {visible} contains no times")
     measured = load_measurement(infrared, settings or ())
@@ -126,21 +127,6 @@ def register(
         (overlay, figure(draw_registration, *shown, marked)),
         (blink, lambda path: write_blink(blink_pictures(*shown), path)),
     )
-
-
-def _region(text: str) -> tuple[float, float, float, float]:
-    from chipglow.quantities.units import POSITION
-
-    try:
-        left, bottom, right, top = (POSITION.parse(part.strip()) for part in text.split(","))
-    except ValueError as error:
-        raise ValueError(
-            f"--align: {text!r}, expected left, bottom, right, top such as "
-            f"'-90 um, 20 um, -10 um, 120 um' ({error})"
-        ) from None
-    if not (left < right and bottom < top):
-        raise ValueError(f"--align: {text!r}: left must be less than right, bottom less than top")
-    return left, bottom, right, top
 
 
 def _check_frame(option: str, number: int, count: int) -> None:

@@ -122,7 +122,7 @@ class Screen:
         self.heading(text.get().removesuffix("\n"))
 
     def _sentences(self, key: str, head: str, sentences: Iterable[str], stream: TextIO) -> None:
-        # What was said before a computation is not said again after it.
+        # A sentence printed before a computation is not repeated after it.
         for sentence in [one for one in sentences if one not in self._record[key]]:
             self._record[key].append(sentence)
             self.heading(f"{head}: {sentence}", stream)

@@ -88,13 +88,13 @@ def _convert_many(sources: list[Path], out: Path | None, settings: list[str], fo
             write_measurement(measurement, targets[source])
         kelvins = measurement.radiance_temperature()
         known = kelvins[np.isfinite(kelvins)]
-        least, median, largest = (
+        smallest, median, largest = (
             np.quantile(known, (0.0, 0.5, 1.0)) - ZERO_CELSIUS if known.size else np.full(3, np.nan)
         )
         return {
             "file": str(source),
             "frames": len(measurement),
-            "least_degC": least,
+            "smallest_degC": smallest,
             "median_degC": median,
             "largest_degC": largest,
             "usable_percent": 100 * np.mean(measurement.usable),
@@ -105,7 +105,7 @@ def _convert_many(sources: list[Path], out: Path | None, settings: list[str], fo
     columns = {
         "file": "file",
         "frames": "frames",
-        "least / °C": "least_degC",
+        "smallest / °C": "smallest_degC",
         "median / °C": "median_degC",
         "largest / °C": "largest_degC",
         "usable / %": "usable_percent",

@@ -138,10 +138,12 @@ def measure(
     from chipglow.camera import Measurement
     from chipglow.cli.progress import progress_bars
     from chipglow.io import open_scene, write_measurement
-    from chipglow.study import fit, load_study
+    from chipglow.study import check_view, fit, load_study
 
     loaded = load_study(study)
-    fitted = fit(loaded, open_scene(scene))
+    opened = open_scene(scene)
+    check_view(opened.raster, loaded.camera)
+    fitted = fit(loaded, opened)
     seen, surfaces = fitted.scene, fitted.surfaces
     camera = loaded.camera.on(seen.raster, loaded.seed)
     name = next(iter(surfaces)) if chip is None else chip

@@ -114,6 +114,7 @@ def _text(column: str, row: Mapping[str, Any]) -> str:
     if uncertainty:
         return uncertain_text(value, row[uncertainty])
     if any(spread in name for spread in _SPREADS):
+        # Two significant digits.
         return f"{value:.0f}" if value >= 100 else f"{value:#.2g}".removesuffix(".")
     return quantity_text(value, "", 1) if name.endswith("degC") else rounded_text(value)
 

@@ -1,7 +1,7 @@
 """The unknowns: parts of square cells that the outlines of the zones cut."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, Final, Literal
 
@@ -27,7 +27,23 @@ _FEW_POINTS: Final = 4
 """Points along the side of the cells at which outlines are searched."""
 
 _LEAST_AREA: Final = 2e-3
-"""Least fraction of a cell of a part: a smaller one sends less light than the model's error."""
+"""Smallest fraction of a cell for a part: a smaller one emits less than the model's error."""
+
+_ORDERS: Final = (3, 0), (2, 1), (1, 2), (0, 3), (4, 0), (2, 2), (0, 4)
+"""Powers of the places to the right and down in the moments of third and fourth order."""
+
+_POWERS: Final = (0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), *_ORDERS
+"""Powers in the moments that the light of a part has."""
+
+_OFFSETS: Final = np.array(
+    [(below, beside) for below in range(-2, 3) for beside in range(abs(below) - 2, 3 - abs(below))]
+)
+"""Offsets, (down, right), of the cells over which the light of a part is distributed."""
+
+_FROM_MOMENTS: Final = np.linalg.inv(
+    [[float(beside) ** r * float(below) ** d for below, beside in _OFFSETS] for r, d in _POWERS]
+)
+"""Weights at `_OFFSETS` from moments in the order of `_POWERS`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +70,8 @@ class Parts:
     """Variance of the places in the part below its centroid."""
     mixed: Array
     """Covariance of both."""
+    moments: Array
+    """Central moments of the places of third and fourth order, (part, moment): `_ORDERS`."""
 
     @property
     def size(self) -> int:
@@ -112,28 +130,43 @@ class Parts:
     def spread(self, x: Array) -> Any:
         """Return where the light of parts is sent from, a sparse array (cell, part).
 
-        The light of a part is distributed over its cell and the eight around it with its area,
-        centroid and second moments. `x`, the logarithm of radiance, shifts the centroid toward the
-        brighter side. Cells half as wide as a pixel then form an image with an error of the third
-        order.
+        The light of a part is distributed over the cells around it with its area and its moments
+        up to the fourth order, without those of odd order in both directions. `x`, the logarithm of
+        radiance, shifts the centroid toward the brighter side. Images of analytic scenes by cells
+        half as wide as a pixel then err by less than 0.1 K beside an outline.
         """
-        right_slope, down_slope = (slope @ x for slope in self.slopes)
-        right = self.right + self.across * right_slope + self.mixed * down_slope
-        down = self.down + self.along * down_slope + self.mixed * right_slope
-        across, along = _three_weights(right, self.across), _three_weights(down, self.along)
         row, column = np.divmod(self.cell, self.cells.columns)
-        weights, places = [], []
-        for below, beside in np.ndindex(3, 3):
-            corner = (below - 1) * (beside - 1) * self.mixed / 4
-            weights.append(along[below] * across[beside] + corner)
-            at_row = (row + below - 1).clip(0, self.cells.rows - 1)
-            at_column = (column + beside - 1).clip(0, self.cells.columns - 1)
-            places.append(at_row * self.cells.columns + at_column)
-        entries = (
-            np.concatenate(weights),
-            (np.concatenate(places), np.tile(np.arange(self.size), 9)),
-        )
-        return sparse.csr_array(entries, shape=(self.cells.rows * self.cells.columns, self.size))
+        at_row = _mirrored(row + _OFFSETS[:, :1], self.cells.rows)
+        at_column = _mirrored(column + _OFFSETS[:, 1:], self.cells.columns)
+        cells = at_row * self.cells.columns + at_column
+        weights = _FROM_MOMENTS @ self._moments_about_centres(x)
+        parts = np.tile(np.arange(self.size), len(_OFFSETS))
+        shape = self.cells.rows * self.cells.columns, self.size
+        return sparse.csr_array((weights.ravel(), (cells.ravel(), parts)), shape=shape)
+
+    def _moments_about_centres(self, x: Array) -> Array:
+        """Return the moments of the light about the centres of the cells, (`_POWERS`, part)."""
+        right_slope, down_slope = (slope @ x for slope in self.slopes)
+        rr, dd, rd = self.across, self.along, self.mixed
+        r = self.right + rr * right_slope + rd * down_slope
+        d = self.down + dd * down_slope + rd * right_slope
+        rrr, rrd, rdd, ddd, rrrr, rrdd, dddd = self.moments.T
+        moments = [
+            np.ones(r.shape),
+            r,
+            d,
+            rr + r**2,
+            rd + r * d,
+            dd + d**2,
+            rrr + 3 * r * rr + r**3,
+            rrd + 2 * r * rd + d * (rr + r**2),
+            rdd + 2 * d * rd + r * (dd + d**2),
+            ddd + 3 * d * dd + d**3,
+            rrrr + 4 * r * rrr + 6 * r**2 * rr + r**4,
+            rrdd + 2 * (d * rrd + r * rdd) + d**2 * rr + 4 * r * d * rd + r**2 * (dd + d**2),
+            dddd + 4 * d * ddd + 6 * d**2 * dd + d**4,
+        ]
+        return np.stack(moments)
 
     def continued(self, values: Array, others: "Parts") -> Array:
         """Return values of parts at the parts of other outlines, from the nearest of each zone."""
@@ -147,12 +180,34 @@ class Parts:
                 found[own] = values[index[tuple(nearest)]].ravel()[others.cell[own]]
         return found
 
+    def within(self, others: "Parts") -> "Parts":
+        """Return the parts on the cells of `others`, which contain their cells."""
+        row, column = np.divmod(self.cell, self.cells.columns)
+        down = round((others.cells.top - self.cells.top) / self.cells.spacing)
+        right = round((self.cells.left - others.cells.left) / self.cells.spacing)
+        cell = (row + down) * others.cells.columns + column + right
+        return replace(self, cells=others.cells, pixels=others.pixels, cell=cell)
+
+    def chosen(self, parts: NDArray[np.intp]) -> "Parts":
+        """Return some of the parts."""
+        names = [field.name for field in fields(self) if field.name not in ("cells", "pixels")]
+        return replace(self, **{name: getattr(self, name)[parts] for name in names})
+
     @cached_property
     def pixel(self) -> NDArray[np.intp]:
         """Index of each part's pixel, in rows from the top."""
         row, column = np.divmod(self.cell, self.cells.columns)
         pixel = row // CELLS_PER_PIXEL * self.pixels.columns + column // CELLS_PER_PIXEL
         return np.asarray(pixel, np.intp)
+
+
+def _mirrored(index: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    """Return indices of 0 to `count` - 1; one beyond an end is as far from it as its mirror image.
+
+    The light of a uniform field is then uniform to the edge of the image.
+    """
+    from_first = np.maximum(index, -1 - index)
+    return np.asarray(np.minimum(from_first, 2 * count - 1 - from_first), np.intp)
 
 
 def cut_cells(observed: ObservedObject, pixels: Raster) -> Parts:
@@ -172,7 +227,7 @@ def cut_cells(observed: ObservedObject, pixels: Raster) -> Parts:
         zone,
         joined["area"],
         joined["emissivity"],
-        *(joined[name] for name in ("right", "down", "across", "along", "mixed")),
+        *(joined[name] for name in ("right", "down", "across", "along", "mixed", "moments")),
     )
 
 
@@ -199,23 +254,42 @@ class _Points:
         return _Points(*(getattr(self, field.name)[mask] for field in fields(self)))
 
     def of_zone(self, number: int) -> dict[str, Array]:
-        """Return area, emissivity, centroid and second moments of a zone's part of each cell."""
+        """Return area, emissivity, centroid and moments of a zone's part of each cell."""
         within = np.where(self.labels == number, self.width * self.height, 0.0)
         area = within.sum(axis=1)
         lit = np.flatnonzero(area > _LEAST_AREA)
         within, (x, y) = within[lit] / area[lit, None], (self.right[lit], self.down[lit])
         right, down = (within * x).sum(axis=1), (within * y).sum(axis=1)
-        own = self.width[lit] ** 2 / 12, self.height[lit] ** 2 / 12
+        from_right = _powers(x - right[:, None], self.width[lit])
+        from_down = _powers(y - down[:, None], self.height[lit])
+
+        def moment(r: int, d: int) -> Array:
+            return np.asarray((within * from_right[r] * from_down[d]).sum(axis=1))
+
         return {
             "cell": self.cell[lit].astype(np.float64),
             "area": area[lit],
             "emissivity": (within * self.emissivity[lit]).sum(axis=1),
             "right": right,
             "down": down,
-            "across": (within * (x**2 + own[0])).sum(axis=1) - right**2,
-            "along": (within * (y**2 + own[1])).sum(axis=1) - down**2,
-            "mixed": (within * x * y).sum(axis=1) - right * down,
+            "across": moment(2, 0),
+            "along": moment(0, 2),
+            "mixed": moment(1, 1),
+            "moments": np.stack([moment(*powers) for powers in _ORDERS], axis=1),
         }
+
+
+def _powers(distance: Array, length: Array) -> tuple[Array | float, ...]:
+    """Return the means of the powers 0 to 4 of the distance over intervals of a length."""
+    spread = length**2 / 12
+    square = distance**2
+    return (
+        1.0,
+        distance,
+        square + spread,
+        distance * (square + 3 * spread),
+        square**2 + 6 * square * spread + length**4 / 80,
+    )
 
 
 def _looked_up(observed: ObservedObject, cells: Raster) -> tuple[_Points, ...]:
@@ -302,9 +376,3 @@ def _zone_parts(number: int, points: Sequence[_Points]) -> dict[str, Array]:
     joined = {name: np.concatenate([one[name] for one in found]) for name in found[0]}
     order = np.argsort(joined["cell"])
     return {name: values[order] for name, values in joined.items()}
-
-
-def _three_weights(centroid: Array, variance: Array) -> tuple[Array, Array, Array]:
-    """Return weights of the places −1, 0 and 1 with this centroid and variance, of sum 1."""
-    square = variance + centroid**2
-    return (square - centroid) / 2, 1 - square, (square + centroid) / 2

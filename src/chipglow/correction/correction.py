@@ -32,7 +32,7 @@ class CorrectionFlag(IntFlag):
     LOWER_BOUND = 2
     """Saturated: only the lower bound is known."""
     INTERPOLATED = 4
-    """Without data of its own: determined by its neighbours."""
+    """Without a measured value: determined by its neighbours."""
     BORDER = 8
     """Depends on the radiance beyond the image, which is taken as that at its edge."""
     NOT_DETERMINED = 16

@@ -30,7 +30,7 @@ class KnownPart:
     line : EmissivityLine or None
         None: not known, so that no temperature is determined there.
     shape : Region, Tool or None
-        Where it is, in the measurement's coordinates; None: the rest of the image.
+        Outline in the measurement's coordinates; None: the rest of the image.
     """
 
     name: str
@@ -45,8 +45,8 @@ class KnownPart:
         if not 0 < float(value.values) <= 1:
             raise ValueError(
                 f"emissivity: that of {self.name!r} is {float(value.values):.3g} at "
-                f"{kelvins - ZERO_CELSIUS:.0f} °C by its line over the temperature, expected over "
-                "0 to 1"
+                f"{kelvins - ZERO_CELSIUS:.0f} °C by its line over the temperature, must be above "
+                "0 and at most 1"
             )
         return Zone(
             self.name,

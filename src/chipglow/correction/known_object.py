@@ -13,7 +13,15 @@ from chipglow.correction.cells import CELLS_PER_PIXEL
 from chipglow.correction.correct import correct
 from chipglow.correction.correction import Correction, joined
 from chipglow.correction.known import ELSEWHERE, TOOL, KnownPart
-from chipglow.correction.zones import AT_REST, Labels, Motion, ObservedObject, ShapedObject, Zone
+from chipglow.correction.zones import (
+    AT_REST,
+    Labels,
+    Motion,
+    ObservedObject,
+    ShapedObject,
+    Zone,
+    check_tools,
+)
 from chipglow.laboratory.emissivity import EmissivityLine, reflected_temperature
 from chipglow.laboratory.emissivity.temperature import FAR
 from chipglow.quantities import ZERO_CELSIUS, Array
@@ -32,7 +40,7 @@ A kelvin changes an emissivity of 0.4 by 0.05 % (2e-4 1/K), and this a temperatu
 """
 
 _LEAST: Final = 0.01
-"""Least emissivity of a map: noise must not make it vanish."""
+"""Smallest emissivity of a map: noise must not make it vanish."""
 
 _MARGIN: Final = 2
 """Samples around a map to which its edge extends: outlines may move by as much."""
@@ -125,9 +133,11 @@ def correct_known(
     Raises
     ------
     ValueError
-        See `chipglow.correct`; or if an emissivity is not over 0 to 1 at a zone's temperature.
+        See `chipglow.correct`; also if the emissivity at the temperature of a zone is 0 or less,
+        or above 1.
     """
     pixels = measurement.raster
+    check_tools([part.shape for part in parts], pixels)
     lines = [EmissivityLine.constant(1.0) if one.line is None else one.line for one in parts]
     values, slopes = np.stack([line.estimate.values for line in lines]).T
     middles = np.array([line.middle for line in lines])
@@ -192,6 +202,7 @@ def correct_mapped(
             f"emissivity: the map lies at {_extent(image.raster)}, expected the place of the "
             f"measurement, {_extent(pixels)}"
         )
+    check_tools(shapes, pixels)
     sharp = _sharpened(image, camera, shapes, pixels)
 
     def known(kelvins: Array) -> tuple[KnownObject, Notes]:
@@ -337,7 +348,7 @@ def _centres(raster: Raster) -> tuple[Array, Array]:
 
 
 def _mean(values: Array) -> float:
-    """Return the mean of the known values; 0 without any, as of a zone outside the image."""
+    """Return the mean of the known values; 0 if all are unknown (a zone outside the image)."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else 0.0
 

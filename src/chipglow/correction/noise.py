@@ -23,7 +23,7 @@ _QUIET: Final = 0.1
 """Quantile of the blocks: detail of the object raises the estimate in most of them."""
 
 _LEAST: Final = 1e-4
-"""Least noise relative to the radiance, far below the noise of any camera."""
+"""Smallest noise relative to the radiance, far below the noise of any camera."""
 
 
 def noise_of(

@@ -25,7 +25,7 @@ _LEAST_VARIANCE: Final = 1e-12
 
 
 _LEAST_WEIGHT: Final = 1e-3
-"""Least weight of a local mean, that of a value about six cells away."""
+"""Smallest weight of a local mean: the weight of a value about six cells away."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +75,17 @@ class Curvature:
                 median = np.median(around[weights > 0])
                 variance[own] = np.maximum(around, median)
         return np.maximum(variance, _LEAST_VARIANCE)
+
+
+def slopes_within(parts: Parts) -> Any:
+    """Return the sparse array (difference, part) of differences of neighbours within zones."""
+    pairs = [
+        np.stack([lines[:-1], lines[1:]]).reshape(2, -1)
+        for index in parts.index
+        for lines in (index, index.T)
+    ]
+    members, weights = _known(np.concatenate(pairs, axis=1), (-1.0, 1.0))
+    return _sparse(members, weights, parts.size)
 
 
 def _known(members: NDArray[np.intp], weights: tuple[float, ...]) -> tuple[NDArray[np.intp], Array]:

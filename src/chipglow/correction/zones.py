@@ -1,6 +1,7 @@
 """Zones of the observed object: their emissivity and their outlines."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import astuple, dataclass, replace
 from math import cos, isfinite, sin
 from typing import Final, TypeAlias
@@ -15,7 +16,7 @@ Labels: TypeAlias = NDArray[np.int16]
 """Index of the zone at each point, or `NOTHING`."""
 
 NOTHING: Final = -1
-"""Label of points that send no light of their own."""
+"""Label of points that emit no light."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +28,9 @@ class Zone:
     name : str
         Name in budgets and messages.
     emissivity : float or None
-        Emissivity, over 0 to 1; None: not known, so that no temperature is determined there.
+        Emissivity, above 0 and at most 1; None: unknown, so that no temperature is determined.
     shape : Region, Tool or None
-        Where it is, in the measurement's coordinates; None: the rest of the image.
+        Outline in the measurement's coordinates; None: the rest of the image.
     uncertainty : float
         Standard uncertainty of the emissivity that is common to the zone.
     texture : float
@@ -53,14 +54,28 @@ class Zone:
     def __post_init__(self) -> None:
         if self.emissivity is not None and not 0 < self.emissivity <= 1:
             raise ValueError(
-                f"zone {self.name}: emissivity is {self.emissivity!r}, expected over 0 to 1"
+                f"zone {self.name}: emissivity is {self.emissivity!r}, "
+                "must be above 0 and at most 1"
             )
         for name in ("uncertainty", "texture"):
             value = getattr(self, name)
             if not (isfinite(value) and 0 <= value < 1):
                 raise ValueError(f"zone {self.name}: {name} is {value!r}, expected 0 to below 1")
         if not 0 < self.grain < 1:
-            raise ValueError(f"zone {self.name}: grain is {self.grain!r} m, expected over 0 m")
+            raise ValueError(f"zone {self.name}: grain is {self.grain!r} m, must be above 0 m")
+
+
+def check_tools(shapes: Iterable[Region | Tool | None], pixels: Raster) -> None:
+    """Raise a ValueError if a tool covers no pixel's centre: its place is wrong."""
+    places = np.meshgrid(pixels.x, pixels.y)
+    for tool in shapes:
+        if isinstance(tool, Tool) and not _inside(tool, pixels, *places).any():
+            left, right, bottom, top = (1e6 * edge for edge in pixels.extent)
+            x, y = (1e6 * float(place) for place in tool.tip)
+            raise ValueError(
+                f"tool: its tip at ({x:.4g}, {y:.4g}) um is outside the image, expected a tool "
+                f"that reaches x {left:.4g} to {right:.4g} um and y {bottom:.4g} to {top:.4g} um"
+            )
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Final, Self
 
-from chipglow.quantities import Parameter, Part, zero_to_one
+from chipglow.quantities import ROUNDING, Parameter, Part, zero_to_one
 from chipglow.quantities.units import CUT_LENGTH, HEAT_TRANSFER, LENGTH, SPEED, TEMPERATURE, TIME
 from chipglow.scene import Raster
 
@@ -133,8 +133,8 @@ class OutputWindow(Part):
     band_delay: Annotated[
         float,
         zero_to_one(
-            "When the band is developed: this part of the time between the last two valleys of "
-            "the cutting force after the later one."
+            "Time after the last valley of the cutting force at which the band is developed, as a "
+            "fraction of the time between the last two valleys."
         ),
     ] = 0.22
     band_duration: Annotated[
@@ -238,7 +238,7 @@ def unresolved(lengths: Mapping[str, float], cell: float) -> tuple[str, ...]:
         f"{CELLS_NEEDED[name]:g} or more: set cutting.numerics.cell to "
         f"{length / CELLS_NEEDED[name] * 1e6:.2g} um."
         for name, length in lengths.items()
-        if 0.0 < length < CELLS_NEEDED[name] * cell * (1 - 1e-9)
+        if 0.0 < length < CELLS_NEEDED[name] * cell * (1 - ROUNDING)
     )
 
 

@@ -89,6 +89,7 @@ class FittedDamage(Part):
             raise ValueError(f"relative_covariance: expected {size} rows of {size} numbers")
         covariance = np.array(self.relative_covariance, dtype=np.float64)
         lowest = np.linalg.eigvalsh(covariance).min()
+        # Rounding may make a variance of 0 negative.
         if not np.allclose(covariance, covariance.T) or lowest < -1e-9 * covariance.max():
             raise ValueError("relative_covariance: must be symmetric without negative variances")
 

@@ -115,7 +115,7 @@ def _by_differences(stress: Callable[..., Any]) -> Any:
 
     @njit(**INLINE)
     def stress_and_slopes(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
-        held = max(strain, 1e-9)
+        held = max(strain, 1e-9)  # hardening has no finite slope at no strain
         here = law_stress(held, rate, temperature, law)
         strained = law_stress(held * (1.0 + _RELATIVE_STEP), rate, temperature, law)
         faster = law_stress(held, rate * (1.0 + _RELATIVE_STEP), temperature, law)

@@ -20,7 +20,7 @@ _LEAST_STRENGTH = 0.01
 """Fraction of the cold strength that a liquid keeps, so that points never lose all stiffness."""
 
 _LEAST_STRAIN = 1e-12
-"""Plastic strain from which on its logarithm is taken."""
+"""Smallest plastic strain of which the logarithm is taken."""
 
 
 @njit(**INLINE)

@@ -68,8 +68,8 @@ class Step(NamedTuple):
     (m²), time step (s), moduli at room temperature (Pa); contact: stiffness (Pa), damping (N s/m²),
     distance at which a point touches (m), area of a point (m²/m), friction; boundary: nodes under
     `floor`, and those left of `inflow` and under `ceiling` (m), move at `speed` (m/s). Friction
-    falls with the temperature over `friction_melting` (K): see `friction_coefficient`. `viscosity`
-    (Pa s) is that of `NonlocalViscosity`.
+    falls with the temperature over `friction_melting` (K): see `friction_coefficient`. `viscosity`:
+    see `NonlocalViscosity` (Pa s).
     """
 
     mass: float

@@ -40,7 +40,7 @@ class Picture:
         highest = round((lattice.top - grid.bottom) / grid.cell)
         rows = slice(highest - lattice.rows + 1, highest + 1)
         self._seen_nodes = slice(across, across + lattice.columns), rows
-        margin = 3 * grid.cell
+        margin = 3 * grid.cell  # more than the 1.5 cells that a spline reaches
         left, right, bottom, top = lattice.raster.extent
         self._view = (left - margin, right + margin, bottom - margin, top + margin)
 

@@ -82,6 +82,7 @@ def sort_by_cell(points, count, grid, right, top, target, starts):  # type: igno
             return -1 - i
         column = int((p.x - grid.left) / grid.cell)
         row = int((p.y - grid.bottom) / grid.cell)
+        # A spline of a point in these cells has all its nodes on the grid, after a drift too.
         inside = 2 <= column < grid.columns - 3 and 2 <= row < grid.rows - 3
         cells[i] = column * grid.rows + row if inside and p.x < right and p.y < top else -1
         if cells[i] >= 0:

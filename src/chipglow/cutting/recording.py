@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chipglow.cutting.conditions import OutputWindow
 from chipglow.cutting.stress import BULK, SHEAR, elastic_energy, kelvin_index
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import ROUNDING, Array, Brief
 from chipglow.scene import Frame, Raster
 
 _SMOOTHING_TIME: Final = 5e-6
@@ -88,10 +88,10 @@ class Recorder:
     def __init__(self, window: OutputWindow, speed: float, cutting_length: float) -> None:
         step = speed * window.interval
         self._window = window
-        self.first = max(ceil(window.start / step - 1e-9), 1)
-        self._last_of_window = floor(window.end / step + 1e-9)
+        self.first = max(ceil(window.start / step - ROUNDING), 1)
+        self._last_of_window = floor(window.end / step + ROUNDING)
         end = cutting_length if window.later_bands else window.end
-        self.last = floor(end / step + 1e-9)
+        self.last = floor(end / step + ROUNDING)
         self._frames = max(1, round(window.band_duration / window.interval))
         self._valleys = Valleys(window.interval)
         self._valley: float | None = None

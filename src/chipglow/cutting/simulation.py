@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import ceil, inf, nan, sqrt
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numba import get_num_threads
@@ -70,7 +70,7 @@ from chipglow.cutting.recording import (
     restore,
 )
 from chipglow.cutting.steady_tool import SteadyTool, ToolBody, beyond, steady_temperature
-from chipglow.quantities import Brief
+from chipglow.quantities import ROUNDING, Brief
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.splines import Lattice
 from chipglow.scene.tool_surface import ToolSurface, surface_distances
@@ -276,19 +276,28 @@ class CuttingSimulation(CutSettings):
         return (*unresolved(lengths, self.numerics.cell), _NO_BAND_WIDTH)
 
     @property
+    def point_count(self) -> float:
+        """Material points of the whole workpiece, about: its memory follows them."""
+        return self._points(self.conditions.cutting_length)
+
+    @property
     def point_steps(self) -> float:
         """Material points times time steps of the whole cut, about: its time follows them.
 
         With a steady tool it includes those of the cut that warms the tool.
         """
         numerics, conditions = self.numerics, self.conditions
-        side = numerics.cell / numerics.points_per_side
-        points = (numerics.upstream + numerics.downstream) * (numerics.depth + conditions.feed)
         step = numerics.courant * numerics.cell / (_sound(self) + conditions.speed)
-        own = points / side**2 * conditions.cutting_length / conditions.speed / step
+        own = self._points() * conditions.cutting_length / conditions.speed / step
         if not isinstance(self.tool_temperature, ToolBody):
             return own
         return own + self._long_cut().point_steps * _USUAL_ROUNDS / _MAX_ROUNDS
+
+    def _points(self, beyond: float = 0.0) -> float:
+        """Return the points in the computed region, and in a length in m that it does not hold."""
+        numerics, feed = self.numerics, self.conditions.feed
+        length = numerics.upstream + numerics.downstream + beyond
+        return length * (numerics.depth + feed) * (numerics.points_per_side / numerics.cell) ** 2
 
     def steady_tool(self) -> SteadyTool:
         """Return the tool after a long cut: cut and conduct in turn until it is steady.
@@ -334,7 +343,7 @@ class CuttingSimulation(CutSettings):
 
     def _recorder(self, window: OutputWindow) -> Recorder:
         length = self.conditions.cutting_length
-        if window.end > length * (1 + 1e-9):
+        if window.end > length * (1 + ROUNDING):
             raise ValueError(
                 f"window end: {window.end * 1e3:g} mm is beyond the cutting length of "
                 f"{length * 1e3:g} mm"
@@ -350,7 +359,7 @@ class CuttingSimulation(CutSettings):
     @property
     def overview_raster(self) -> Raster:
         """Samples of a quarter of a cell over the computed region."""
-        grid, samples = _grid(self.numerics), 4
+        grid, samples = _grid(self.numerics), 4  # per side of a cell
         leaving = 2  # cells at the right and at the top, through which the material leaves
         left = grid.left + _MARGIN_CELLS * grid.cell
         top = grid.bottom + (grid.rows - 1 - _MARGIN_CELLS - leaving) * grid.cell
@@ -364,7 +373,7 @@ class CuttingSimulation(CutSettings):
         """Return the nodes whose splines the frames are; the raster must be simulated."""
         grid = _grid(self.numerics)
         left, right, bottom, top = raster.extent
-        edge = 3 * grid.cell
+        edge = 3 * grid.cell  # more than the 1.5 cells that a spline reaches
         inside = (
             left >= grid.left + edge
             and bottom >= grid.bottom + edge
@@ -379,81 +388,94 @@ class CuttingSimulation(CutSettings):
         return lattice_of(grid, raster, self.tool, self.conditions.initial_temperature)
 
 
+class _Metal(NamedTuple):
+    """The workpiece's material as the kernels take it."""
+
+    law: Any
+    damage: Damage
+    elastic: NDArray[np.float64]
+    capacity: NDArray[np.float64]  # heat capacity in J/(kg K), sampled over the temperature
+    heat_fractions: NDArray[np.float64]
+    conductivity: NDArray[np.float64]  # in W/(m K), sampled over the temperature
+    diffusivity: float  # in m²/s at the initial temperature
+    effusivity: float  # in J/(m² K √s) at the initial temperature
+
+    @classmethod
+    def of(cls, simulation: CuttingSimulation) -> "_Metal":
+        material, start = simulation.workpiece, simulation.conditions.initial_temperature
+        conductivity = float(material.conductivity.at(start))
+        capacity = float(material.density_at(start) * material.heat_capacity.at(start))
+        return cls(
+            law=material.flow_stress.numbers(),
+            damage=Damage.of(material.damage, material.failing_layer(simulation.numerics.cell)),
+            elastic=material.elastic_ratios(),
+            capacity=material.heat_capacity.sampled(),
+            heat_fractions=material.heat_fractions(),
+            conductivity=material.conductivity.sampled(),
+            diffusivity=conductivity / capacity,
+            effusivity=sqrt(conductivity * capacity),
+        )
+
+
+def _step_of(simulation: CuttingSimulation) -> Step:
+    """Return the constants of a step; the time step is 0 until it is chosen."""
+    conditions, numerics = simulation.conditions, simulation.numerics
+    material, friction = simulation.workpiece, simulation.friction
+    spacing = _spacing(numerics)
+    heat_mass = float(material.density_at(conditions.initial_temperature)) * spacing**2
+    mass = heat_mass * simulation.mass_scaling
+    resists, exponent = material.nonlocal_viscosity, friction.thermal_exponent
+    return Step(
+        mass=mass,
+        heat_mass=heat_mass,
+        volume=heat_mass / float(material.density_at(ROOM_TEMPERATURE)),
+        time_step=0.0,
+        shear_modulus=float(material.shear_modulus_at(ROOM_TEMPERATURE)),
+        bulk_modulus=float(material.bulk_modulus_at(ROOM_TEMPERATURE)),
+        stiffness=_CONTACT_STIFFNESS,
+        damping=_CONTACT_DAMPING * 2 * np.sqrt(_CONTACT_STIFFNESS * mass),
+        reach=spacing / 2,
+        area=spacing,
+        friction=friction.coefficient,
+        friction_factor=friction.friction_factor,
+        floor=-numerics.depth,
+        inflow=-numerics.upstream,
+        ceiling=conditions.feed + 2 * numerics.cell,
+        speed=conditions.speed,
+        friction_exponent=exponent or 1.0,
+        friction_melting=inf if exponent is None else material.melting_temperature,
+        viscosity=resists.viscosity if resists is not None else 0.0,
+    )
+
+
+def _tool_heat(simulation: CuttingSimulation, effusivity: float) -> ToolHeat:
+    """Return the heat of the tool; friction heat is shared by the effusivities in contact."""
+    tool = simulation.tool_material
+    return ToolHeat(
+        capacity=tool.density * tool.heat_capacity,
+        conductivity=tool.conductivity,
+        friction_fraction=float(tool.effusivity / (tool.effusivity + effusivity)),
+        conductance=simulation.friction.conductance,
+        area=_spacing(simulation.numerics),
+    )
+
+
 class _State:
-    """State of a running simulation."""
+    """State of a running simulation, advanced by an interval in s at a time."""
 
     def __init__(self, simulation: CuttingSimulation, interval: float) -> None:
         conditions, numerics = simulation.conditions, simulation.numerics
-        material = simulation.workpiece
-        cell, spacing = numerics.cell, numerics.cell / numerics.points_per_side
+        self.simulation, self.interval = simulation, interval
+        self.speed, self.spacing = conditions.speed, _spacing(numerics)
         self.grid = _grid(numerics)
         self.tool = simulation.tool.surface
-        self.speed, self.spacing = conditions.speed, spacing
-        self.simulation, self.interval = simulation, interval
-        heat_mass = float(material.density_at(conditions.initial_temperature)) * spacing**2
-        mass = heat_mass * simulation.mass_scaling
-        resists, exponent = material.nonlocal_viscosity, simulation.friction.thermal_exponent
-        self.step = Step(
-            mass=mass,
-            heat_mass=heat_mass,
-            volume=heat_mass / float(material.density_at(ROOM_TEMPERATURE)),
-            time_step=0.0,
-            shear_modulus=float(material.shear_modulus_at(ROOM_TEMPERATURE)),
-            bulk_modulus=float(material.bulk_modulus_at(ROOM_TEMPERATURE)),
-            stiffness=_CONTACT_STIFFNESS,
-            damping=_CONTACT_DAMPING * 2 * np.sqrt(_CONTACT_STIFFNESS * mass),
-            reach=spacing / 2,
-            area=spacing,
-            friction=simulation.friction.coefficient,
-            friction_factor=simulation.friction.friction_factor,
-            floor=-numerics.depth,
-            inflow=-numerics.upstream,
-            ceiling=conditions.feed + 2 * cell,
-            speed=conditions.speed,
-            friction_exponent=exponent or 1.0,
-            friction_melting=inf if exponent is None else material.melting_temperature,
-            viscosity=resists.viscosity if resists is not None else 0.0,
-        )
-        law = material.flow_stress.numbers()
-        damage = Damage.of(material.damage, material.failing_layer(cell))
-        self.step_points = advance_with(law)
-        self.elastic = material.elastic_ratios()
-        self.capacity = material.heat_capacity.sampled()
-        self.matter = law, damage, self.elastic, self.capacity, material.heat_fractions()
-        self.conductivity = material.conductivity.sampled()
-        start, of_tool = conditions.initial_temperature, simulation.tool_material
-        conductivity = float(material.conductivity.at(start))
-        capacity = float(material.density_at(start) * material.heat_capacity.at(start))
-        self.diffusivity = conductivity / capacity
-        self.effusivity = sqrt(conductivity * capacity)
-        self.tool_heat = ToolHeat(
-            capacity=of_tool.density * of_tool.heat_capacity,
-            conductivity=of_tool.conductivity,
-            friction_fraction=float(of_tool.effusivity / (of_tool.effusivity + self.effusivity)),
-            conductance=simulation.friction.conductance,
-            area=spacing,
-        )
+        self.step = _step_of(simulation)
+        self.metal = _Metal.of(simulation)
+        self.step_points = advance_with(self.metal.law)
+        self.tool_heat = _tool_heat(simulation, self.metal.effusivity)
         self.loss = HeatLoss.of(simulation.surroundings, numerics)
-        self.tool_fraction = fraction_of_tool(self.grid, self.tool)
-        shape = (self.grid.columns, self.grid.rows)
-        self.velocity = np.zeros((*shape, VELOCITY_VALUES))
-        self.velocity[..., VELOCITY_X] = conditions.speed
-        self.nodes = np.zeros((*shape, NODE_VALUES))
-        self.heat_nodes = np.zeros((*shape, 3))
-        self.increment = np.zeros(shape)
-        self.entered = np.zeros((*shape, 2))
-        self.contact_area = np.zeros(shape)
-        self.friction_heat = np.zeros(shape)
-        given = simulation.tool_temperature
-        initial = given if isinstance(given, float) else start
-        self.tool_temperature = np.full(shape, initial)
-        self.tool_border = border_nodes(self.tool_fraction)
-        far = (len(self.tool_border), CELLS)
-        self.tool_beyond = np.full(far, initial)
-        self.starts = np.zeros(self.grid.columns * self.grid.rows + 1, np.int64)
-        self.grids = (
-            self.starts, self.velocity, self.nodes, self.friction_heat, self.tool, self.grid
-        )  # fmt: skip
+        self._start_grid()
+        self._start_tool()
         self._start_points(conditions, numerics)
         self.time = 0.0
         self.choose_steps()
@@ -461,6 +483,29 @@ class _State:
         self.carried = 0.0
         self.lost_heat = 0.0
         self.held_at_start = self._held()
+
+    def _start_grid(self) -> None:
+        """Make the arrays of the nodes, which move with the workpiece."""
+        shape = (self.grid.columns, self.grid.rows)
+        self.velocity = np.zeros((*shape, VELOCITY_VALUES))
+        self.velocity[..., VELOCITY_X] = self.speed
+        self.nodes = np.zeros((*shape, NODE_VALUES))
+        self.heat_nodes = np.zeros((*shape, 3))
+        self.increment = np.zeros(shape)
+        self.entered = np.zeros((*shape, 2))
+        self.contact_area = np.zeros(shape)
+        self.friction_heat = np.zeros(shape)
+        self.starts = np.zeros(self.grid.columns * self.grid.rows + 1, np.int64)
+
+    def _start_tool(self) -> None:
+        """Give the tool its initial temperature, on the grid and beyond."""
+        given = self.simulation.tool_temperature
+        start = self.simulation.conditions.initial_temperature
+        initial = given if isinstance(given, float) else start
+        self.tool_fraction = fraction_of_tool(self.grid, self.tool)
+        self.tool_temperature = np.full((self.grid.columns, self.grid.rows), initial)
+        self.tool_border = border_nodes(self.tool_fraction)
+        self.tool_beyond = np.full((len(self.tool_border), CELLS), initial)
 
     def warm(self, tool: SteadyTool, body: ToolBody) -> None:
         """Give the tool the temperature of a long cut."""
@@ -481,7 +526,7 @@ class _State:
         if contact <= 0.0:
             raise SolverError("warm tool: the chip did not touch the tool")
         # Jaeger's slider at high speed: mean rise q √(L / V) / (0.94 e) over a contact of length L.
-        draining = 0.94 * self.effusivity * sqrt(self.speed / contact) * area
+        draining = 0.94 * self.metal.effusivity * sqrt(self.speed / contact) * area
         met = 0.5 * (begin + self.tool_temperature)
         found = steady_temperature(
             self.grid, self.tool_fraction, self.tool_heat, body,
@@ -503,6 +548,7 @@ class _State:
         heights = np.linspace(0.0, conditions.feed, 64)  # of the face, finer than the cells
         self.face = _touching(self.tool, heights)
         self.columns = 0
+        # Four cells and four columns are spare.
         travel = conditions.cutting_length + 4 * numerics.cell
         capacity = int((self.face - self.entry + travel) / self.spacing + 4) * self.rows.size
         self.points = np.zeros(capacity, POINT)
@@ -540,7 +586,7 @@ class _State:
     def advance(self) -> NDArray[np.float64]:
         """Advance by one interval; return mean forces in N/m, thickness in m, and the energies."""
         sums, threads = np.zeros_like(self.work), get_num_threads()
-        resists = self.simulation.workpiece.nonlocal_viscosity
+        metal, resists = self.metal, self.simulation.workpiece.nonlocal_viscosity
         points = self.points[: self.count]
         points["strain_before"] = points["strain"]
         for _ in range(self.cycles):
@@ -549,8 +595,10 @@ class _State:
             self._sort()
             self.carried += self._held().sum() - before
             good = self.step_points(
-                self.steps, self.points, *self.grids, self.step, *self.matter, sums, threads
-            )
+                self.steps, self.points, self.starts, self.velocity, self.nodes,
+                self.friction_heat, self.tool, self.grid, self.step, metal.law, metal.damage,
+                metal.elastic, metal.capacity, metal.heat_fractions, sums, threads,
+            )  # fmt: skip
             self.time += self.cycle
             if not good:
                 self._stop_at(find_off_grid(self.points[: self.count], self.grid))
@@ -590,16 +638,16 @@ class _State:
     def _held(self) -> NDArray[np.float64]:
         """Return kinetic and elastic energy of the points in J/m."""
         return np.array(
-            held_energy(self.points, self.count, self.step, self.elastic, self.grid.cell)
+            held_energy(self.points, self.count, self.step, self.metal.elastic, self.grid.cell)
         )
 
     def _conduct(self) -> None:
         points, count, grid, cycle = self.points, self.count, self.grid, self.cycle
         nodes, rise, mass = self.heat_nodes, self.increment, self.step.heat_mass
-        capacity = self.capacity
+        metal, capacity = self.metal, self.metal.capacity
         tool, filled, heat = self.tool_temperature, self.tool_fraction, self.tool_heat
-        part = min(self.diffusivity * cycle / grid.cell**2, 1.0)
-        conduct(points, count, nodes, rise, self.conductivity, capacity, mass, grid, cycle, part)
+        part = min(metal.diffusivity * cycle / grid.cell**2, 1.0)
+        conduct(points, count, nodes, rise, metal.conductivity, capacity, mass, grid, cycle, part)
         conduct_tool(tool, filled, heat, grid, cycle)
         conduct_beyond(tool, self.tool_beyond, self.tool_border, filled, heat, grid, cycle)
         if self.loss.convection > 0.0 or self.loss.emissivity > 0.0:
@@ -658,6 +706,11 @@ class _State:
         )
 
 
+def _spacing(numerics: Numerics) -> float:
+    """Return the distance of neighbouring points before the cut in m."""
+    return numerics.cell / numerics.points_per_side
+
+
 def _grid(numerics: Numerics) -> Grid:
     margin = _MARGIN_CELLS * numerics.cell
     width = numerics.upstream + numerics.downstream + 2 * margin
@@ -684,7 +737,7 @@ def _time_steps(
     material, numerics = simulation.workpiece, simulation.numerics
     drift = min(
         _MAX_DRIFT * numerics.cell / simulation.conditions.speed,
-        _MAX_FASTEST_DRIFT * numerics.cell / max(fastest, 1e-9),
+        _MAX_FASTEST_DRIFT * numerics.cell / max(fastest, 1e-9),  # at rest in m/s
     )
     tool, temperature = simulation.tool_material, simulation.conditions.initial_temperature
     diffusivity = max(

@@ -31,16 +31,23 @@ _SMALL_CHANGE = 0.02
 """Change of the logarithm of an increment below which it counts as found: the step that follows
 squares the error."""
 
+_LARGEST_CHANGE = 3.0
+"""Largest change of the logarithm of an increment in a step of Newton: a factor of 20."""
+
 _SMALL_STRAIN = 0.01
 """Plastic strain below which hardening is too steep to predict an increment."""
 
 _MOST_HELP = 0.95
 """Fraction of a point's strength that the flow around it takes off at most: it stays a solid."""
+
+_ROWS = 22
+"""Number of rows of the buffer."""
+
 (
     DXX, DYY, DXY, STRAIN, DAMAGE, TEMPERATURE, INCREMENT, VOLUME,
     CXX, CXY, CYX, CYY, TRIAL, WEAK, BOUND, WORK, SOFT, TENSION, FREE, EXPANSION, FALL, MEAN,
-) = range(0, 22 * _ROW_LENGTH, _ROW_LENGTH)  # fmt: skip
-BUFFER = 22 * _ROW_LENGTH
+) = range(0, _ROWS * _ROW_LENGTH, _ROW_LENGTH)  # fmt: skip
+BUFFER = _ROWS * _ROW_LENGTH
 STRESS = TRIAL
 """Rows of the buffer; in the end the trial stress has become the equivalent stress (Pa). `SOFT` is
 the shear modulus over that at room temperature; the deviator is that at room temperature. `FREE` is
@@ -107,7 +114,7 @@ def _improve(b, count, shear_modulus, time_step, viscosity, law, damage):  # typ
         change = excess / max(fall, 0.5 * stiffness * tried)
         plastic = bound > 0.0
         far += 1 if moving and plastic and abs(change) > _SMALL_CHANGE else 0
-        better = tried * exponential(min(max(change, -3.0), 3.0))
+        better = tried * exponential(min(max(change, -_LARGEST_CHANGE), _LARGEST_CHANGE))
         # Below the slowest rate the trial stress determines the flow.
         better = better if moving else min(slowest, bound)
         largest = max(b[TRIAL + k], 0.0) / stiffness

@@ -178,7 +178,7 @@ def draw_mean(
     """Draw the mean of draws, one per row, ± a standard deviation, and the first draw dotted."""
     mean, deviation = draws.mean(axis=0), draws.std(axis=0)
     axes.plot(along, mean, color=colour, label=name)
-    shade(axes, along, mean, deviation, colour, 0.2)
+    shade(axes, along, mean, deviation, colour, opacity=0.2)
     axes.plot(along, draws[0], color=colour, linewidth=0.9, linestyle=":")
 
 

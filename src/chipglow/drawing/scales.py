@@ -45,6 +45,7 @@ def shown_frame(
     """Return the index of the frame nearest to a time, by default the middle one."""
     if time is None:
         return (len(times) - 1) // 2
+    # Half the time between frames, and 1 ns for the rounding of a stated time.
     slack = 1e-9 + (float(np.diff(times).min()) / 2 if len(times) > 1 else 0.0)
     if not times[0] - slack <= time <= times[-1] + slack:
         shown, first, last = (f"{1e6 * one:.7g} us" for one in (time, times[0], times[-1]))

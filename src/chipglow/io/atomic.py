@@ -26,10 +26,10 @@ _OF_THE_SYSTEM: Final = {MANIFEST, ".DS_Store", "Thumbs.db", "desktop.ini"}
 _NO_ROOM: Final = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 _AT_FDCWD: Final = -100
-"""Of Linux's renameat2: paths are relative to the working folder."""
+"""Argument of Linux's renameat2: paths are relative to the working folder."""
 
 _RENAME_EXCHANGE: Final = 2
-"""Of Linux's renameat2: exchange both."""
+"""Flag of Linux's renameat2: exchange both."""
 
 _INPUTS: ContextVar[Mapping[tuple[int, int], Path]] = ContextVar(
     "inputs", default=MappingProxyType({})

@@ -30,7 +30,9 @@ STRAIN_OF_CHIP: Final = 1.0
 
 _Corner: TypeAlias = tuple[Position, Position]
 _VELOCITY: Final = frozenset(("velocity_x", "velocity_y"))
+
 _CHIP_STARTS, _CHIP_ENDS = 0.3, 0.5
+"""Plastic strain between which a material starts to move with the chip, and moves with it."""
 
 _MOST_FILLED: Final = 0.5
 """Fraction of filled samples above which it is a warning."""

@@ -114,8 +114,8 @@ def check_file(path: Path, by_frame: bool = False) -> None:
         Sandbox("HDF5", patience).answer(partial(_read_all, str(path), intact is False, by_frame))
     if intact is False:
         raise ValueError("the file is damaged: its digest does not match")
-    check_own_data(path)
     check_bounds(path, by_frame)
+    check_own_data(path)
 
 
 def _read_all(path: str, whole: bool, by_frame: bool) -> None:

@@ -80,6 +80,7 @@ class FieldOfView(Part):
                 f"{survey.kind}: {samples:.3g} samples of {spacing:g} m, expected up to "
                 f"{MOST_SAMPLES:.0e}; a larger spacing makes fewer"
             )
+        # A millionth of a sample is rounding and needs no further row or column.
         rows, columns = (max(ceil(side / spacing - 1e-6), 2) for side in (height, width))
         raster = Raster(left, top, spacing, rows, columns)
         view, there = raster.extent, survey.extent

@@ -13,7 +13,7 @@ from chipglow.camera import Measurement
 from chipglow.camera.measurement import MEASUREMENT_UNITS
 from chipglow.io.digest import check_file, is_intact, write_hdf5
 from chipglow.io.packing import COMPRESSION
-from chipglow.text import HDF5_ERRORS, MemoryLimitError
+from chipglow.text import HDF5_ERRORS, MemoryLimitError, check_regular
 
 Made = TypeVar("Made")
 
@@ -63,6 +63,7 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
 
 def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, kind: str) -> Made:
     """Return `made_of` the data of a NetCDF-4 file, which should be `what` in a file of `kind`."""
+    check_regular(path)
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such file, expected {what}")
     try:
@@ -79,6 +80,7 @@ def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, k
 def holds(path: str | os.PathLike[str], names: Iterable[str]) -> bool:
     """Return whether a file is HDF5, whole enough to be opened, and has all these at its root."""
     path = Path(path)
+    check_regular(path)
     if not path.is_file() or not h5py.is_hdf5(path):
         return False
     if is_intact(path) is False:

@@ -13,11 +13,26 @@ from functools import partial
 from pathlib import Path
 from typing import IO, Any, Final, TypeAlias, TypeVar
 
+from chipglow.io.answers import (
+    ANSWER,
+    END,
+    MISSING,
+    READY,
+    REFUSED,
+    AnswerError,
+    error_of,
+    read_answer,
+    write_answer,
+)
+from chipglow.io.parent import end_with_parent
 from chipglow.io.sources.source import Source, SourceError, Survey, damaged
 from chipglow.scene import Raster, SampledFrame
 
 MEMORY: Final = 2 * 1024**3
 """Memory limit of a reader, in bytes."""
+
+STARTING: Final = 300.0
+"""Maximum time in s for the start of a process: 2 s, or minutes on a machine that is overloaded."""
 
 PATIENCE: Final = 600.0
 """Maximum time in s for one answer.
@@ -29,11 +44,12 @@ The slowest reader, that of Abaqus' text, takes 0.4 us a byte: 1.5 GB in this ti
 _CHILD: Final = ("-P", "-c", "from chipglow.io.sandbox import main; main()")
 
 Job: TypeAlias = Callable[[], Iterator[Any]]
-"""A function that can be pickled, or a partial one; so can its answers."""
+"""A function that can be pickled, or a partial one; `write_answer` takes its answers."""
 
 Answer = TypeVar("Answer")
 
-_END: Final = "end of the answers"
+_END: Final = object()
+"""The end of the answers."""
 
 _KEPT: ContextVar["list[subprocess.Popen[bytes]] | None"] = ContextVar("kept", default=None)
 """Processes that wait for a job, inside of `one_process`."""
@@ -59,11 +75,7 @@ class Sandbox:
         """
         request = pickle.dumps((job, self.name, self.memory))
         kept = _KEPT.get()
-        process = kept.pop() if kept else _started()
-        if process.poll() is not None:  # the system ended it while it waited
-            _end(process)
-            process = _started()
-        is_idle = False
+        process, is_idle = self._waiting(kept), False
         try:
             assert process.stdin is not None
             with suppress(BrokenPipeError):  # it ended: its code is reported below
@@ -79,33 +91,52 @@ class Sandbox:
             else:
                 _end(process)
 
+    def _waiting(self, kept: "list[subprocess.Popen[bytes]] | None") -> "subprocess.Popen[bytes]":
+        """Return a process that waits for a job: a kept one, or a new one."""
+        if kept:
+            process = kept.pop()
+            if process.poll() is None:
+                return process
+            _end(process)  # the system ended it while it waited
+        process = _started()
+        try:
+            self._in_time(process, STARTING)
+        except BaseException:
+            _end(process)
+            raise
+        return process
+
     def answer(self, function: Callable[[], Answer]) -> Answer:
-        """Return what a function returns; it can be pickled. For errors see `answers`."""
+        """Return what a function returns, which `write_answer` takes. For errors see `answers`."""
         with self.answers(partial(_once, function)) as answers:
             answer: Answer = next(answers)
         return answer
 
     def _answers(self, process: "subprocess.Popen[bytes]") -> Iterator[Any]:
-        while not isinstance(answer := self._in_time(process), str) or answer != _END:
-            if isinstance(answer, Exception):
-                raise answer
-            yield answer
+        while (message := self._in_time(process, self.patience))[0] != END:
+            kind, value = message
+            if kind != ANSWER:
+                raise error_of(kind, value)
+            yield value
 
-    def _in_time(self, process: "subprocess.Popen[bytes]") -> Any:
+    def _in_time(self, process: "subprocess.Popen[bytes]", patience: float) -> tuple[str, Any]:
         late = threading.Event()
 
         def give_up() -> None:
             late.set()
             process.kill()
 
-        timer = threading.Timer(self.patience, give_up)
+        timer = threading.Timer(patience, give_up)
         timer.daemon = True
         assert process.stdout is not None
         try:
             timer.start()
-            return pickle.load(process.stdout)
-        except (EOFError, pickle.UnpicklingError):
-            reason = f"had no answer in {self.patience:.0f} s"
+            return read_answer(process.stdout, self.memory)
+        except AnswerError as error:
+            process.kill()
+            raise SourceError(f"{self.name}: its reader gave no answer ({error})") from None
+        except EOFError:
+            reason = f"had no answer in {patience:.0f} s"
             if not late.is_set():
                 code = process.wait()
                 reason = f"ended with code {code}, the file is damaged or too large to be read"
@@ -172,10 +203,12 @@ def _once(function: Callable[[], Any]) -> Iterator[Any]:
 
 def main() -> None:
     """Read requests from standard input, answer on standard output."""
+    end_with_parent()
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a library prints must not mix with the answers
     is_limited = False
     with suppress(BrokenPipeError), answers:
+        write_answer(answers, READY)
         while True:
             try:
                 job, name, memory = pickle.load(sys.stdin.buffer)
@@ -190,27 +223,22 @@ def main() -> None:
 def _answer(answers: IO[bytes], job: Job, name: str) -> None:
     try:
         for answer in job():
-            _send(answers, answer)
-        _send(answers, _END)
+            write_answer(answers, ANSWER, answer)
+        write_answer(answers, END)
     except BrokenPipeError:
         raise
-    except Exception as error:  # readers of damaged files raise anything
-        _send(answers, failure(name, error))
-
-
-def _send(stream: IO[bytes], answer: Any) -> None:
-    pickle.dump(answer, stream, pickle.HIGHEST_PROTOCOL)
-    stream.flush()
-
-
-def failure(name: str, error: Exception) -> Exception:
-    """Return the error that the parent raises for an error of a reader."""
-    if isinstance(error, FileNotFoundError):
+    except FileNotFoundError as error:
         text = f"{error.filename}: {error.strerror}" if error.filename else str(error)
-        return FileNotFoundError(text)
+        write_answer(answers, MISSING, text)
+    except Exception as error:  # readers of damaged files raise anything
+        write_answer(answers, REFUSED, str(failure(name, error)))
+
+
+def failure(name: str, error: Exception) -> SourceError:
+    """Return the error that the parent raises for an error of a reader."""
     if isinstance(error, MemoryError):
         return SourceError(f"{name}: needs more memory than a reader may take")
-    return SourceError(str(error)) if isinstance(error, SourceError) else damaged(name, error)
+    return error if isinstance(error, SourceError) else damaged(name, error)
 
 
 def limit_memory(memory: int) -> None:

@@ -33,6 +33,7 @@ from chipglow.quantities.settings import (
     value_text as value_text,
 )
 from chipglow.quantities.units import (
+    ROUNDING as ROUNDING,
     ZERO_CELSIUS as ZERO_CELSIUS,
     Array as Array,
     Quantity as Quantity,

@@ -14,6 +14,12 @@ def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "")
     return f"{number.replace(',', ' ').replace('-', '−')} {unit}".strip()
 
 
+_MOST_DECIMALS: Final = 9
+"""Most decimals of a number, with which `_FINEST` shows its first digit."""
+
+_PLAIN_POWERS: Final = (-5, 12)
+"""Powers of ten of the smallest and largest numbers without an exponent."""
+
 _FINEST: Final = 1e-9
 """Uncertainty below which a number is exact but for the rounding of the computation."""
 
@@ -28,7 +34,7 @@ def uncertain_text(value: float, uncertainty: float) -> str:
 
 def uncertain_decimals(uncertainty: float) -> int:
     """Return the number of decimals with which two digits of a standard uncertainty are shown."""
-    return min(max(0, 1 - floor(log10(uncertainty))), 9)
+    return min(max(0, 1 - floor(log10(uncertainty))), _MOST_DECIMALS)
 
 
 def uncertainty_text(uncertainty: float) -> str:
@@ -45,9 +51,9 @@ def rounded_text(value: float, unit: str = "") -> str:
     if value == 0.0:
         return quantity_text(0.0, unit, 0)
     size = floor(log10(abs(value)))
-    if not -5 <= size <= 12:
+    if not _PLAIN_POWERS[0] <= size <= _PLAIN_POWERS[1]:
         return f"{value:.3e} {unit}".strip()
-    return quantity_text(value, unit, max(3 - size, 0))
+    return quantity_text(value, unit, max(3 - size, 0))  # four digits
 
 
 def readable(text: str) -> str:

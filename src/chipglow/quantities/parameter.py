@@ -2,16 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, reduce
 from math import inf, isfinite, nextafter
+from operator import or_
 from types import NoneType, UnionType
-from typing import Any, Final, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 from pydantic import (
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     SerializationInfo,
     SerializerFunctionWrapHandler,
+    Strict,
     ValidationError,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
@@ -100,8 +102,7 @@ class Parameter:
     ) -> CoreSchema:
         plain, words = self._without_words(source)
         if self.quantity is None:
-            schema = handler(plain)
-            _take_lists(schema)
+            schema = handler(mapped(plain, _from_list))
             if self.allowed:
                 schema = core_schema.no_info_wrap_validator_function(self._shaped, schema)
         else:
@@ -208,16 +209,25 @@ zero_to_one: Final = partial(Parameter, least=0.0, most=1.0)
 """Declares a fraction: a number from 0 to 1."""
 
 
-def _take_lists(schema: Any) -> None:
-    """Let tuples be read from lists: YAML has no tuples."""
-    if isinstance(schema, dict):
-        if schema.get("type") == "tuple":
-            schema["strict"] = False
-        for inner in schema.values():
-            _take_lists(inner)
-    elif isinstance(schema, list):
-        for inner in schema:
-            _take_lists(inner)
+def mapped(kind: Any, change: Callable[[Any], Any]) -> Any:
+    """Return a type after a change, which its arguments undergo first."""
+    if get_origin(kind) is Annotated:
+        return change(Annotated[mapped(kind.__origin__, change), *kind.__metadata__])
+    arguments = get_args(kind)
+    if not arguments or get_origin(kind) is Literal:
+        return change(kind)
+    changed = tuple(
+        one if one is Ellipsis or isinstance(one, list) else mapped(one, change)
+        for one in arguments
+    )
+    if get_origin(kind) in (Union, UnionType):
+        return change(reduce(or_, changed))
+    return change(kind if changed == arguments else get_origin(kind)[changed])
+
+
+def _from_list(kind: Any) -> Any:
+    """Return a type that is also read from a list if it is a tuple: YAML has no tuples."""
+    return Annotated[kind, Strict(False)] if get_origin(kind) is tuple else kind
 
 
 def _or_words(schema: CoreSchema, words: dict[str, Any]) -> CoreSchema:

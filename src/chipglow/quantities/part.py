@@ -6,12 +6,10 @@ import reprlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, fields as dataclass_fields
 from difflib import get_close_matches
-from functools import cache, reduce
+from functools import cache
 from importlib.metadata import entry_points
 from inspect import isabstract
-from operator import or_
 from pathlib import Path
-from types import UnionType
 from typing import (
     Annotated,
     Any,
@@ -21,7 +19,6 @@ from typing import (
     NotRequired,
     Self,
     TypeVar,
-    Union,
     get_args,
     get_origin,
 )
@@ -42,7 +39,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 from typing_extensions import TypedDict
 
-from chipglow.quantities.parameter import Parameter
+from chipglow.quantities.parameter import Parameter, mapped
 from chipglow.quantities.units import is_number
 
 Class = TypeVar("Class", bound=type)
@@ -515,15 +512,11 @@ def _with_parameters(text: str, annotations: Mapping[str, Any]) -> str:
 
 def _plain(annotation: Any) -> Any:
     """Return a type without the metadata of `Annotated`, also in its arguments."""
-    if get_origin(annotation) is Annotated:
-        return _plain(annotation.__origin__)
-    inner = get_args(annotation)
-    if not inner or get_origin(annotation) is Literal:
-        return annotation
-    if get_origin(annotation) in (Union, UnionType):
-        return reduce(or_, map(_plain, inner))
-    plain = tuple(one if one is Ellipsis or isinstance(one, list) else _plain(one) for one in inner)
-    return annotation if plain == inner else get_origin(annotation)[plain]
+
+    def bare(kind: Any) -> Any:
+        return kind.__origin__ if get_origin(kind) is Annotated else kind
+
+    return mapped(annotation, bare)
 
 
 def _type_text(annotation: Any) -> str:

@@ -21,6 +21,9 @@ Array: TypeAlias = NDArray[np.float64]
 ZERO_CELSIUS: Final = 273.15
 """In K."""
 
+ROUNDING: Final = 1e-9
+"""Relative slack of comparisons: arithmetic changes equal decimal numbers by less."""
+
 _NUMBER: Final = r"\d{1,40}(?:\.\d{0,40})?(?:[eE][+-]?\d{1,3})?|\.\d{1,40}(?:[eE][+-]?\d{1,3})?"
 _FRACTION: Final = r"\d{1,3}/\d{1,3}"
 # 1/s only after a space: 101/s is not 10 1/s.
@@ -222,6 +225,7 @@ class Quantity:
         exact = (Decimal(repr(float(value))) - offset) / scale
         if exact == 0:
             return "0"
+        # Numbers of other sizes are shorter with an exponent.
         for digits in range(1, _MOST_DIGITS):
             rounded = Decimal(f"{exact:.{digits}g}")
             number = f"{rounded:f}" if -7 < rounded.adjusted() < 12 else f"{rounded:g}"

@@ -30,6 +30,18 @@ Response: TypeAlias = Callable[[Array], Array]
 PAPER_BAND: Final = (3.8e-6, 5.1e-6)
 """Limits in m of the spectral band of the paper's camera, the default of cameras and surfaces."""
 
+_LONGEST_WAVELENGTH: Final = 1e-3
+"""Longest wavelength in m; a longer one is stated in another unit."""
+
+_PANEL_FALL: Final = 10.0
+"""Largest change of the exponent in Planck's law over a panel, at the lowest temperature."""
+
+_RESPONSE_PANELS: Final = 64
+"""Fewest panels for a band with a spectral response, which may change over short distances."""
+
+_NEWTON_STEPS: Final = 60
+"""Most steps of Newton's method."""
+
 _NODES_PER_PANEL: Final = 16
 """Gauss nodes of each panel of an integral over wavelength."""
 
@@ -125,7 +137,7 @@ class Band:
                 f"band: expected 0 < lower < upper in m, got lower={self.lower!r}, "
                 f"upper={self.upper!r}"
             )
-        if self.upper > 1e-3:
+        if self.upper > _LONGEST_WAVELENGTH:
             raise ValueError(
                 f"band: upper={self.upper!r} m is longer than 1 mm; "
                 "wavelengths are in m (3.8 um is 3.8e-6)"
@@ -233,9 +245,9 @@ class Band:
     def _quadrature(self) -> tuple[Array, Array]:
         """Wavelengths and weights (response included), in panels over which Planck is smooth."""
         fall = SECOND_RADIATION_CONSTANT / COLDEST * (1 / self.lower - 1 / self.upper)
-        panels = max(1, ceil(fall / 10.0))
+        panels = max(1, ceil(fall / _PANEL_FALL))
         if self.response is not None:
-            panels = max(panels, 64)
+            panels = max(panels, _RESPONSE_PANELS)
         # Over 1/λ the integrand is a cubic times an exponential: smooth however wide the band.
         edges = np.linspace(1 / self.upper, 1 / self.lower, panels + 1)
         node, weight = np.polynomial.legendre.leggauss(_NODES_PER_PANEL)
@@ -280,14 +292,14 @@ class Band:
     def _invert(self, radiance: Array) -> Array:
         """Invert by Newton's method on ln L over 1/T, which is nearly straight."""
         target = np.log(radiance)
-        inverse = np.full_like(target, 1e-3)
-        for _ in range(60):
+        inverse = np.full_like(target, 1e-3)  # 1/K: begin at 1000 K
+        for _ in range(_NEWTON_STEPS):
             temperature = 1.0 / inverse
             value, rise = self._with_slope(temperature)
             slope = -rise * temperature**2 / value
             step = (np.log(value) - target) / slope
-            inverse = np.maximum(inverse - step, 0.2 * inverse)
-            if (np.abs(step) <= 1e-14 * inverse).all():
+            inverse = np.maximum(inverse - step, 0.2 * inverse)  # a step may not change the sign
+            if (np.abs(step) <= 1e-14 * inverse).all():  # rounding
                 break
         return 1.0 / inverse
 

@@ -74,6 +74,7 @@ def maps(facts: Facts) -> Figure | None:
     if "effect" not in data.dims:
         return None
     every = data.attribution_contribution.where(data.attribution_lost == 0).sel(surface=names)
+    # Effects that contribute to few pixels only are not shown.
     size = np.abs(every).quantile(0.95, [dim for dim in every.dims if dim != "effect"])
     shown = every.sel(effect=size > _LEAST)
     if shown.size == 0:

@@ -53,7 +53,7 @@ def sentences(facts: Facts, rows: Mapping[str, Row]) -> Iterator[str]:
 
 
 def _cells(rows: Mapping[str, Row], start: str, end: str) -> dict[str, str]:
-    """Return the texts of the numbers whose keys begin and end so, by what is between."""
+    """Return the texts of numbers whose keys have this start and end, by the rest of the key."""
     return {
         key.removeprefix(f"{start}_").removesuffix(f"_{end}"): row.cells["mean"]
         for key, row in rows.items()

@@ -1,6 +1,6 @@
 """Figures of a cut: heated chips and tool, rake face, dual spectrum, shear band, forces, chip."""
 
-from typing import Any
+from typing import Any, Final
 
 import matplotlib
 import numpy as np
@@ -17,11 +17,26 @@ from chipglow.quantities import ZERO_CELSIUS
 from chipglow.report.facts import Facts
 from chipglow.scene import Frame, Material, Raster
 from chipglow.scene.figures import draw_chip, image_figure, show_image
+from chipglow.scene.tool import DRAWN_FACE
 from chipglow.surface import Emissivity, Texture
 
 _GRAIN, _SEED, _STEEL = 9e-6, 8, Emissivity(0.62, 0.07)
+"""Texture of the visible picture: grain in m, seed, mean grey and its standard deviation."""
+
 _VOID, _SHEARED, _DARKEST = 0.28, (1.5, 5.0), 0.45
-"""Settings of the visible picture: texture in m, greys, plastic strains, darkness of bands."""
+"""Grey beyond the material, plastic strains of first and full darkening, and darkness of bands."""
+
+_BRIGHTEST: Final = 0.88
+"""Fraction of the colour map that is used: its end is too bright for a line on white."""
+
+_LARGEST_STRAIN: Final = 4.0
+"""Plastic strain of the last colour."""
+
+_NARROWEST: Final = 50.0
+"""Smallest range of a scale of temperatures in K."""
+
+_DARK_START: Final = 100.0
+"""Temperature in °C at which a scale begins if the camera states no lower limit."""
 
 
 def heated_chips(facts: Facts) -> Figure | None:
@@ -49,6 +64,7 @@ def heated_tool(facts: Facts) -> Figure | None:
     left, right = figure.subplots(1, 2)
     title = f"a) tool, at {found.map.heating.reference - ZERO_CELSIUS:.0f} °C"
     draw_heated(figure, left, found.map, (), title, tool)
+    # Three pixels from the faces, blur from outside the tool is small.
     inside = tool.signed_distance(*np.meshgrid(raster.x, raster.y)) < -3 * raster.spacing
     right.hist(found.map.emissivity[inside], bins=40, color=BLUE, density=True)
     row = found.rows[0]
@@ -94,8 +110,8 @@ def dual_spectrum(facts: Facts) -> Figure:
     starts = analysis.data.instant.values[: facts.starts]
     figure = image_figure(analysis.raster, 2.3, rows=rows)
     grid = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
-    low = (analysis.camera.lower_limit or ZERO_CELSIUS + 100.0) - ZERO_CELSIUS
-    heat = (low, max(scales.round_limit(images[np.isfinite(images)], 99.9, 50.0), low + 50.0))
+    low = (analysis.camera.lower_limit or ZERO_CELSIUS + _DARK_START) - ZERO_CELSIUS
+    heat = (low, max(scales.round_limit(images[np.isfinite(images)], 99.9, 50.0), low + _NARROWEST))
     pixels = analysis.measurements[name].raster
     for (left, right), frame in zip(grid, cut.moments, strict=True):
         grey = _visible_picture(frame, analysis.raster)
@@ -105,7 +121,7 @@ def dual_spectrum(facts: Facts) -> Figure:
         left.set_title(f"visible, {frame.time * 1e6:.0f} µs")
         right.set_title(f"infrared, {name}")
         for axes in (left, right):
-            axes.fill(*(1e6 * tool.outline(3e-3)).T, color="black")
+            axes.fill(*(1e6 * tool.outline(DRAWN_FACE)).T, color="black")
             axes.set_facecolor(GREY)
             axes.label_outer()
     drawing.colour_bar(figure, picture, list(grid[:, 1]), "radiance temperature / °C")
@@ -117,7 +133,7 @@ def band_curves(facts: Facts) -> Figure:
     data, shown = facts.data, int(facts.data.attrs["shown_instant"])
     figure = drawing.new_figure(3.7)
     panels = figure.subplots(1, data.sizes["surface"], sharex=True, sharey=True, squeeze=False)[0]
-    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.88, facts.starts))
+    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, _BRIGHTEST, facts.starts))
     after = (data.instant.values - data.instant.values[0]) * 1e6
     for axes, name in zip(panels, data.surface.values, strict=True):
         curves = data.ridge_radiance_temperature.sel(surface=name).values - ZERO_CELSIUS
@@ -181,7 +197,7 @@ def chip_thickness(facts: Facts) -> Figure | None:
     figure = drawing.new_figure(3.6)
     left, right = figure.subplots(1, 2)
     strain = np.where(frame.material == Material.WORKPIECE, frame.needed("plastic_strain"), np.nan)
-    picture = show_image(left, strain, raster, tool, scales.PLAIN, (0.0, 4.0))
+    picture = show_image(left, strain, raster, tool, scales.PLAIN, (0.0, _LARGEST_STRAIN))
     drawing.colour_bar(figure, picture, left, "plastic strain")
     thickness = float(np.interp(frame.time, scan.time, scan.thickness))
     foot, normal = tool.rake_point(scan.height), np.array(tool.rake_normal)
@@ -200,6 +216,7 @@ def chip_thickness(facts: Facts) -> Figure | None:
     for label, level in levels.items():
         if np.isfinite(level):
             right.axhline(level * 1e6, color=GREY, linewidth=0.8, linestyle=":")
+            # Beside the axes.
             right.annotate(f"{label} {level * 1e6:.0f}", (1.02, level * 1e6), **place)
     right.set(xlabel="time / µs", ylabel="thickness / µm", title="b) the chip passing the line")
     return figure

@@ -24,6 +24,9 @@ from chipglow.report.quoted import Quoted
 
 Array = NDArray[np.float64]
 
+_MARGIN: Final = 50.0
+"""Part of a temperature scale below the camera's limit, and its smallest range, in K."""
+
 SCENE_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate", "emissivity")
 """Fields that the figure of the scene shows, if it has them."""
 
@@ -46,7 +49,7 @@ class Facts:
         camera = analysis.camera
         values = {
             "analysis": analysis,
-            "attribution_reference": getattr(analysis.plan.attribution, "reference", ""),
+            "attribution_reference": data.attrs.get("attribution_reference", ""),
             "camera": camera,
             "cause": data.exposure.attrs["title"],
             "chip": cut.chip if cut else None,
@@ -80,7 +83,7 @@ class Facts:
 
     @property
     def cut(self) -> Cut:
-        """The cut, for what is shown of a cut only."""
+        """The cut, for texts and figures that exist for cuts only."""
         assert self.analysis.cut is not None
         return self.analysis.cut
 
@@ -128,8 +131,9 @@ class Facts:
         """Return ends of a scale of temperatures, the lower near the camera's lower limit."""
         low, high = scales.ends(celsius, 0.5, 99.9, 1.0)
         limit = self.analysis.camera.lower_limit
-        low = low if limit is None else max(limit - ZERO_CELSIUS - 50.0, low)
-        return low, max(high, low + 50.0)
+        # From 50 K below the limit, over 50 K or more.
+        low = low if limit is None else max(limit - ZERO_CELSIUS - _MARGIN, low)
+        return low, max(high, low + _MARGIN)
 
     def series(self, reading: str, unit: str) -> Array | None:
         """Return error in K or fraction of the PSF in % over the PSF widths; None if unknown."""

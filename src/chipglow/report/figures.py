@@ -59,22 +59,29 @@ _LINE_LABELS: Final = {
 }
 
 
+_PSF_SAMPLES: Final = 12
+"""Samples over the width of a point spread function in its figure."""
+
+_PSF_REACH: Final = 15e-6
+"""Distance in m from its centre up to which a point spread function is shown."""
+
+
 def point_spread(facts: Facts) -> Figure | None:
     """Draw the point spread function of the camera and its cross-section."""
     camera = facts.analysis.camera
     psf = camera.psf
     if psf is None:
         return None
-    spacing = min(facts.analysis.raster.spacing, psf.fwhm / 12)
+    spacing = min(facts.analysis.raster.spacing, psf.fwhm / _PSF_SAMPLES)
     kernel = psf.kernel(spacing)
     middle = kernel.shape[0] // 2
-    half = min(middle, round(15e-6 / spacing))
+    half = min(middle, round(_PSF_REACH / spacing))
     near = slice(middle - half, middle + half + 1)
     density = kernel[near, near] / kernel.max()
     reach, side = (half + 0.5) * spacing * 1e6, camera.pitch * 1e6 / 2
     figure = drawing.new_figure(3.2)
     left, right = figure.subplots(1, 2)
-    logarithm = np.log10(np.maximum(density, 1e-6))
+    logarithm = np.log10(np.maximum(density, 1e-6))  # below the darkest colour
     extent = (-reach, reach, -reach, reach)
     picture = left.imshow(logarithm, extent=extent, cmap=scales.PLAIN, vmin=-4.0, vmax=0.0)
     square = [-side, side, side, -side, -side], [-side, -side, side, side, -side]

@@ -13,7 +13,7 @@ from markupsafe import Markup, escape
 from chipglow.drawing.drawing import data_url, png
 from chipglow.quantities.format import quantity_text, readable
 from chipglow.report.shown_units import in_unit
-from chipglow.text.yaml_file import parse_yaml
+from chipglow.text import parse_yaml
 
 _IMPORT: Final = '{% from "sentences.txt" import gaussian_widths, main_cause, wings with context %}'
 _BEFORE_UNIT: Final = re.compile(r"(?<=\d) (?=[°%µ]|[KN]\b|mm\b|1/s)|(?<=±) | (?=±)")

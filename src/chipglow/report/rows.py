@@ -348,6 +348,7 @@ def _decimals(draws: Distribution) -> int:
     """Return one decimal for numbers below ten and for small uncertainties, else none."""
     deviation = draws.standard_deviation
     size = max(abs(draws.mean), deviation if isfinite(deviation) else 0.0)
+    # 9.95 is the smallest number that rounds to 10.0, and 0.95 to 1.0 with one decimal.
     return 0 if size >= 9.95 and not draws.expanded_uncertainty < 0.95 else 1
 
 

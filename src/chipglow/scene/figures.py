@@ -17,7 +17,7 @@ from chipglow.drawing.scales import GREEN, HEAT, PLAIN, RATE, VOID, ends
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene.frame import Frame, Material
 from chipglow.scene.raster import Raster
-from chipglow.scene.tool import Tool
+from chipglow.scene.tool import DRAWN_FACE, Tool
 
 if TYPE_CHECKING:
     from chipglow.scene.scene import Scene
@@ -88,7 +88,7 @@ def veil(
 
 def draw_tool(axes: Axes, tool: Tool, factor: float = 1e6) -> None:
     """Draw the tool's outline, visible on dark and light backgrounds."""
-    outline = tool.outline(3e-3) * factor
+    outline = tool.outline(DRAWN_FACE) * factor
     axes.plot(*outline.T, color="white", linewidth=2.2)
     axes.plot(*outline.T, color="black", linewidth=1.0)
 
@@ -164,6 +164,7 @@ def field_panels(frame: Frame) -> list[ImagePanel]:
 
 def _decades(rate: NDArray[Any]) -> tuple[float, float]:
     fastest = ends(rate, 0.0, 99.9)[1]
+    # A power of ten is its own top, whatever the rounding of the logarithm.
     top = float(np.ceil(np.log10(max(fastest, 1e-30)) - 1e-9))
     return 10.0 ** (top - _DECADES), 10.0**top
 

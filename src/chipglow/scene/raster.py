@@ -1,13 +1,16 @@
 """The regular grid of a scene's samples (the paper's sub-pixels)."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION
+
+MOST_SAMPLES: Final = 100_000
+"""Samples along an axis: an image of half as many in both takes 20 GB in double precision."""
 
 
 def check_shape(name: str, found: tuple[int, ...], expected: tuple[int, ...]) -> None:
@@ -28,9 +31,9 @@ class Raster(Part):
 
     left: Annotated[float, Parameter("Left edge of the scene.", POSITION)]
     top: Annotated[float, Parameter("Upper edge of the scene.", POSITION)]
-    spacing: Annotated[float, Parameter("Side of a sample.", LENGTH)]
-    rows: Annotated[int, Parameter("Samples from top to bottom.", least=1)]
-    columns: Annotated[int, Parameter("Samples from left to right.", least=1)]
+    spacing: Annotated[float, Parameter("Side of a sample.", LENGTH, least=1e-12)]
+    rows: Annotated[int, Parameter("Samples from top to bottom.", least=1, most=MOST_SAMPLES)]
+    columns: Annotated[int, Parameter("Samples from left to right.", least=1, most=MOST_SAMPLES)]
 
     @property
     def x(self) -> NDArray[np.float64]:

@@ -4,6 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from chipglow.quantities import ROUNDING
 from chipglow.scene.frame import Material
 
 Taps = tuple[NDArray[np.int64], NDArray[np.float64]]
@@ -19,9 +20,9 @@ def taps(centres: NDArray[np.float64], spacing: float, wanted: NDArray[np.float6
     step = (centres[-1] - centres[0]) / (centres.size - 1)
     place = (wanted - centres[0]) / step
     # A sample that is on the edge but for rounding is on the grid.
-    inside = (place > -0.5 - 1e-9) & (place < centres.size - 0.5 + 1e-9)
+    inside = (place > -0.5 - ROUNDING) & (place < centres.size - 0.5 + ROUNDING)
     ratio = spacing / step
-    if ratio <= 1.0 + 1e-9:
+    if ratio <= 1.0 + ROUNDING:
         place = np.clip(place, 0.0, centres.size - 1.0)
         first = np.minimum(place.astype(np.int64), centres.size - 2)
         weights = np.stack([1.0 - (place - first), place - first], axis=1)

@@ -190,7 +190,7 @@ class Scene:
 
     def frame_at(self, time: float) -> int:
         """Return the number of the frame that stands for a time in s: the last up to it."""
-        rounded = time + 1e-6 * self.frame_spacing
+        rounded = time + 1e-6 * self.frame_spacing  # rounding of times
         return max(int(np.searchsorted(self.times, rounded, side="right")) - 1, 0)
 
     @property
@@ -403,6 +403,7 @@ def _check_even(name: str, values: NDArray[np.float64], *, ascending: bool) -> N
         raise SceneError(
             f"scene: {name} must {'ascend' if ascending else 'descend (row 0 on top)'}"
         )
+    # Files may state coordinates with few digits.
     if not np.allclose(steps, steps.mean(), rtol=1e-3):
         raise SceneError(f"scene: {name} must have even steps")
 
@@ -420,6 +421,7 @@ def _check_field(name: str, values: NDArray[np.float32], time: float) -> None:
         raise SceneError(f"scene: {name!r} is not finite everywhere at {time:.9g} s")
     if name == "temperature" and not COLDEST <= lowest <= highest <= HOTTEST:
         wrong = lowest if lowest < COLDEST else highest
+        # Below the smallest temperature, numbers above −100 are usual temperatures in °C.
         hint = f"; it looks like °C, add {ZERO_CELSIUS}" if -100.0 < wrong < COLDEST else ""
         raise SceneError(
             f"scene: temperature {wrong:.6g} at {time:.9g} s, expected kelvin of "

@@ -56,6 +56,7 @@ class Lattice:
             ("rows", self.down, self.rows),
             ("columns", self.across, self.columns),
         ):
+            # A quadratic spline has three nodes.
             if first.min() < 0 or first.max() + 3 > nodes:
                 raise ValueError(f"lattice: {nodes} {name} of nodes must extend beyond the samples")
 

@@ -23,6 +23,9 @@ STEEPEST_RAKE: Final = radians(60.0)
 LARGEST_CLEARANCE: Final = radians(45.0)
 """Largest clearance angle in rad."""
 
+DRAWN_FACE: Final = 3e-3
+"""Length in m of the faces of a tool in figures: they end outside the image of a cut."""
+
 _RIGHT_ANGLE: Final = pi / 2
 
 _ARC_STEP: Final = pi / 64

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipglow.scene.tool import SMALLEST_WEDGE, Chamfer, Hone, Tool, ToolGeometry, check_angles
 from chipglow.scene.tool_surface import FACE_LENGTH
 
-MOST_POINTS: Final = 1000
+MOST_OUTLINE_POINTS: Final = 1000
 """Most points of a tool's outline."""
 
 _LARGEST_SPAN: Final = 20e-3
@@ -127,9 +127,9 @@ class ToolOutline(Tool):
 
 
 def _check_points(line: NDArray[np.float64]) -> None:
-    if not 3 <= len(line) <= MOST_POINTS:
-        last = min(max(len(line) - 1, 0), MOST_POINTS)
-        raise ToolOutlineError(f"{len(line)} points, expected 3 to {MOST_POINTS}", last)
+    if not 3 <= len(line) <= MOST_OUTLINE_POINTS:
+        last = min(max(len(line) - 1, 0), MOST_OUTLINE_POINTS)
+        raise ToolOutlineError(f"{len(line)} points, expected 3 to {MOST_OUTLINE_POINTS}", last)
     if line.ndim != 2 or line.shape[1] != 2:
         raise ToolOutlineError(f"points of shape {line.shape}, expected (n, 2)")
     finite = np.isfinite(line).all(axis=1)

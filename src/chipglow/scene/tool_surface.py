@@ -100,7 +100,7 @@ def _wedge_distance(x, y, tool):  # type: ignore[no-untyped-def]
         and tool.clearance_x * px + tool.clearance_y * py < 0.0
     ):
         length = np.sqrt(px * px + py * py)
-        if length < 1e-12:
+        if length < 1e-12:  # m: at the tip any normal will do
             return -tool.radius, -tool.rake_y, tool.rake_x
         return length - tool.radius, px / length, py / length
     rake = tool.rake_x * py - tool.rake_y * px
@@ -153,7 +153,7 @@ def _side(x, y, tool, piece, place):  # type: ignore[no-untyped-def]
         py -= place * ty
         piece = min(piece + 1, chain.shape[0] - 1)
     distance = np.sqrt(px * px + py * py)
-    if distance < 1e-12:
+    if distance < 1e-12:  # m: on a corner of the chain
         return -tool.radius, nx, ny
     if chain[piece, NORMAL_X] * px + chain[piece, NORMAL_Y] * py < 0.0:
         distance = -distance

@@ -13,7 +13,11 @@ from chipglow.study.corrected import (
     corrected_temperatures as corrected_temperatures,
 )
 from chipglow.study.corrections import correct_study as correct_study
-from chipglow.study.cost import expected_cost as expected_cost
+from chipglow.study.cost import (
+    check_cost as check_cost,
+    check_view as check_view,
+    expected_cost as expected_cost,
+)
 from chipglow.study.design import Design as Design, design as design
 from chipglow.study.files import load_study as load_study, study_text as study_text
 from chipglow.study.fitting import Fitted as Fitted, fit as fit

@@ -206,7 +206,7 @@ def study_budget(
     Raises
     ------
     ValueError
-        If an input is no number of the study or takes impossible values, or the scene is a file
+        If an input is not a number of the study or takes impossible values, or the scene is a file
         and a setting of the cut is an input.
 
     Notes

@@ -249,7 +249,7 @@ def _emissivities(study: Study) -> list[tuple[float, float]]:
 def _check_reflected(row: TrueTemperature, band: Band, study: float | None) -> None:
     """Raise ValueError if other surroundings change the radiance of a region by too much.
 
-    What surroundings at room temperature reflect is nothing beside a hot object.
+    Reflections of surroundings at room temperature are negligible for a hot object.
     """
     surroundings = row.inputs[2]
     kelvins, spread = float(surroundings.values), float(surroundings.standard_uncertainty)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, TypeAlias
 
 from chipglow.analysis import Plan
-from chipglow.quantities import ZERO_CELSIUS, Part, own_settings
+from chipglow.quantities import ROUNDING, ZERO_CELSIUS, Part, own_settings
 from chipglow.quantities.units import LENGTH
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study.schema import Study
@@ -117,7 +117,7 @@ def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
 
 def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
     exposure, spacing = study.camera.integration_time, scene.frame_spacing
-    if len(scene.times) > 1 and exposure < _FRAMES_NEEDED * spacing * (1 - 1e-9):
+    if len(scene.times) > 1 and exposure < _FRAMES_NEEDED * spacing * (1 - ROUNDING):
         yield (
             f"Each frame of the scene represents {spacing * 1e6:.3g} us of the exposure's "
             f"{exposure * 1e6:.3g} us: motion within that time is neglected. Use a scene with more "
@@ -125,7 +125,7 @@ def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
         )
     cutting = study.cutting
     cells = cutting.feed / cutting.numerics.cell
-    if study.scene is None and cells < _CELLS_NEEDED * (1 - 1e-9):
+    if study.scene is None and cells < _CELLS_NEEDED * (1 - ROUNDING):
         yield (
             f"The feed is {cells:.3g} cells: too coarse for forces and shear bands; use "
             f"{_CELLS_NEEDED} or more (cutting.numerics.cell)."

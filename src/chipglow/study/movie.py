@@ -18,9 +18,10 @@ from chipglow.cutting import CuttingSimulation
 from chipglow.drawing import drawing, scales
 from chipglow.io import movie_writer
 from chipglow.io.movie_file import PALETTE_SIZE
-from chipglow.quantities import ZERO_CELSIUS
+from chipglow.quantities import ROUNDING, ZERO_CELSIUS
 from chipglow.scene import Frame, Material, Raster
 from chipglow.scene.figures import show_image
+from chipglow.scene.tool import DRAWN_FACE
 
 _DPI: Final = 100
 """Pixels per inch."""
@@ -39,9 +40,6 @@ _HEIGHTS: Final = (240, 1080)
 
 _TOOL: Final = "#9ca3af"
 
-_FACE_LENGTH: Final = 3e-3
-"""Length in m to which the tool's faces are drawn."""
-
 _HOT_FRACTION: Final = 0.6
 """Place of the hottest colour from the initial temperature, 0, to the melting point, 1."""
 
@@ -50,6 +48,12 @@ _LARGEST_STRAIN: Final = 5.0
 
 _DECADES: Final = 3
 """Decades of the colours of the strain rate."""
+
+_HOT_STEP: Final = 50.0
+"""The hottest colour is a multiple of this number of °C."""
+
+_GREYS: Final = 30
+"""Greys of a movie among its colours: text, tool and edges that are smoothed."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +69,9 @@ class MovieScales:
         conditions = simulation.conditions
         start = conditions.initial_temperature
         hottest = start + _HOT_FRACTION * max(simulation.workpiece.melting_temperature - start, 0.0)
-        top = 50.0 * ceil((hottest - ZERO_CELSIUS) / 50.0 + 1e-9) + ZERO_CELSIUS
-        decade = floor(log10(0.1 * conditions.speed / conditions.feed) + 1e-9)
+        top = _HOT_STEP * ceil((hottest - ZERO_CELSIUS) / _HOT_STEP + ROUNDING) + ZERO_CELSIUS
+        # The scale begins below a tenth of speed over feed, the strain rate of the shear zone.
+        decade = floor(log10(0.1 * conditions.speed / conditions.feed) + ROUNDING)
         return cls(
             temperature=(start, top),
             strain=(0.0, _LARGEST_STRAIN),
@@ -132,7 +137,7 @@ class CutPicture:
             axes.label_outer()
             self._images.append(image)
         for axes in panels[1:]:
-            axes.fill(*(self._tool.outline(_FACE_LENGTH) * 1e6).T, color=_TOOL, zorder=1.5)
+            axes.fill(*(self._tool.outline(DRAWN_FACE) * 1e6).T, color=_TOOL, zorder=1.5)
         self._title = self._figure.suptitle(" ", fontsize=11)
         self._moving: list[Artist] = [self._title]
         for axes in panels:
@@ -155,9 +160,8 @@ def cut_movie(
 
 def _palette() -> NDArray[np.uint8]:
     """Return the colours of the three scales and greys, as many as a GIF can hold."""
-    greys = 30
-    each = (PALETTE_SIZE - greys) // 3
+    each = (PALETTE_SIZE - _GREYS) // 3
     maps: list[Any] = [scales.HEAT, scales.PLAIN, scales.RATE]
     colours = [matplotlib.colormaps[name](np.linspace(0.0, 1.0, each))[:, :3] for name in maps]
-    plain = np.repeat(np.linspace(0.0, 1.0, greys)[:, None], 3, axis=1)
+    plain = np.repeat(np.linspace(0.0, 1.0, _GREYS)[:, None], 3, axis=1)
     return np.asarray(np.round(np.concatenate([*colours, plain]) * 255), dtype=np.uint8)

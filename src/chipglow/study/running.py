@@ -27,6 +27,7 @@ from chipglow.io.digest import is_intact
 from chipglow.quantities import adapter, unchecked
 from chipglow.scene import Frame, SceneError, ToolOutline
 from chipglow.study.cache import scene_path
+from chipglow.study.cost import check_cost, check_view
 from chipglow.study.fitting import Fitted, fit, left_to_the_paper
 from chipglow.study.preview import preview_of, show_scene
 from chipglow.study.schema import Study
@@ -135,7 +136,15 @@ def run(study: Study, progress: Progress | None = None, resume: bool = False) ->
     """
     with fitted_study(study, progress, resume) as fitted:
         camera = study.camera.on(fitted.scene.raster, study.seed)
-        analysis = analyse(fitted.scene, fitted.surfaces, camera, study.plan, progress)
+        analysis = analyse(
+            fitted.scene,
+            fitted.surfaces,
+            camera,
+            study.plan,
+            progress,
+            attribution=study.attribution,
+            correction=study.known,
+        )
         notes = fitted.notes
         warnings = (*notes.warnings, *analysis.warnings)
         return replace(analysis, assumed=tuple(notes.assumed), warnings=warnings)
@@ -192,7 +201,9 @@ def fitted_study(study: Study, progress: Progress | None, resume: bool) -> Itera
     """Yield the scene and the surfaces of a study; errors name the scene file."""
     path = cut(study, progress, resume) if study.scene is None else Path(study.scene)
     try:
-        fitted, left = fit(study, open_scene(path)), Notes(list(left_to_the_paper(study)))
+        scene = open_scene(path)
+        check_view(scene.raster, study.camera)
+        fitted, left = fit(study, scene), Notes(list(left_to_the_paper(study)))
         yield replace(fitted, notes=left + fitted.notes)
     except SceneError:
         raise
@@ -232,6 +243,7 @@ def _compute(
     resume: bool,
     on_preview: Callable[[Frame], None] | None,
 ) -> None:
+    check_cost(study)
     progress(CUTTING_STEP, 0.0)
     cutting = study.cutting
     raster = cutting.field_of_view.build()

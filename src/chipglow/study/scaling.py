@@ -49,7 +49,7 @@ def resolved(cutting: CuttingSection, camera: CameraSection) -> CuttingSection:
 
 @dataclass(frozen=True)
 class _Numbers:
-    """Numbers of a study in SI units from which others follow."""
+    """Independent settings of a study in SI units, from which others follow."""
 
     ratio: float
     """Feed relative to the paper's."""

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 
 from chipglow.analysis import AttributionPlan, CorrectionPlan, Plan, WavelengthPlan
 from chipglow.camera import AnnularAperturePSF
-from chipglow.quantities import FileBeside, Parameter, Part, changed
+from chipglow.quantities import ROUNDING, FileBeside, Parameter, Part, changed
 from chipglow.study.camera_section import CameraSection
 from chipglow.study.cutting_section import STEADY, CuttingSection
 from chipglow.study.scaling import resolved
@@ -68,8 +68,8 @@ class Study(Part):
     correction: Annotated[
         bool,
         Parameter(
-            "Whether the report of a cut corrects rake face and shear band for all that is known. "
-            "Standard uncertainties are those of uncertainty.inputs, else that of the heated chip."
+            "Whether the report of a cut corrects rake face and shear band for all known effects. "
+            "Standard uncertainties are taken from uncertainty.inputs, else from the heated chip."
         ),
     ] = True
 
@@ -88,8 +88,7 @@ class Study(Part):
     @property
     def plan(self) -> Plan:
         """The plan of the analysis, with PSF widths around the camera's."""
-        known = self._known() if self.correction else None
-        plan = replace(self.analysis, attribution=self.attribution, correction=known)
+        plan = self.analysis
         psf = self.camera.build().psf
         ratio = 1.0 if psf is None else psf.fwhm / AnnularAperturePSF().fwhm
         if "psf_widths" not in self.analysis.given and ratio != 1.0:
@@ -100,8 +99,11 @@ class Study(Part):
         (name,) = surface_names(self.surface)
         return replace(plan, rake_chip=name, band_chip=name)
 
-    def _known(self) -> CorrectionPlan:
-        """Return the uncertainties of emissivity and PSF width among the inputs of the budget."""
+    @property
+    def known(self) -> CorrectionPlan | None:
+        """Knowledge of a correction: uncertainties of emissivity and PSF width, by the budget."""
+        if not self.correction:
+            return None
         inputs = {one.name: one for one in self.uncertainty.build(self).inputs}
         width = inputs.get("camera.psf.fwhm", inputs.get("camera.psf.numerical_aperture"))
         emissivity = {}
@@ -198,14 +200,14 @@ class Study(Part):
                 f"cutting.window.interval: {window.interval * 1e6:g} us is longer than the "
                 f"exposure, expected up to {camera.integration_time * 1e6:g} us"
             )
-        if window.later_bands and window.band_duration < camera.integration_time * (1 - 1e-9):
+        if window.later_bands and window.band_duration < camera.integration_time * (1 - ROUNDING):
             raise ValueError(
                 f"cutting.window.band_duration: {window.band_duration * 1e6:g} us is shorter than "
                 f"the exposure, expected {camera.integration_time * 1e6:g} us or more"
             )
         view = cutting.field_of_view
         extent = view.spacing * min(view.rows, view.columns)
-        if camera.pitch > extent * (1 + 1e-9):
+        if camera.pitch > extent * (1 + ROUNDING):
             raise ValueError(
                 f"camera.pitch: {camera.pitch * 1e6:g} um is larger than the field of view, "
                 f"expected up to the {extent * 1e6:g} um of cutting.field_of_view"

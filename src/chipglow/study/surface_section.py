@@ -46,7 +46,11 @@ CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2
 
 @dataclass(frozen=True)
 class ChipSection(Part):
-    """Emissivity of one chip."""
+    """Emissivity of one chip.
+
+    Its fields are those of a `FeatureSurface` that differ from chip to chip; a description calls
+    the chip of a chip its body.
+    """
 
     body: Annotated[Emissivity, FeatureSurface.parameter("chip")]
     shear_band: Annotated[Emissivity, FeatureSurface.parameter("shear_band")]

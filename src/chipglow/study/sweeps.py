@@ -8,13 +8,13 @@ from functools import cache, cached_property
 from hashlib import sha256
 from importlib.metadata import version
 from itertools import product
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 import pandas as pd
 import xarray as xr
-import yaml
 from scipy.stats import qmc
 
 from chipglow.analysis import Analysis, headlines
@@ -24,7 +24,7 @@ from chipglow.quantities import Quantity, adapter, changed, setting_at
 from chipglow.study.running import Progress, cut, is_cut, run, scene_inputs
 from chipglow.study.schema import Study
 from chipglow.study.workers import Client, local_client, on_client
-from chipglow.text import Notes, result_html
+from chipglow.text import Notes, parse_yaml, result_html
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,8 +41,14 @@ NUMBERS: Final = ("reference", "error", "uncertainty", "psf_portion", "true_erro
 FRACTIONS: Final = ("below_range", "saturated")
 """Stored fractions of each reading's place below the lower range limit, and saturated."""
 
+MOST_POINTS: Final = 100_000
+"""Points of a sweep: each is a file in one folder, and a study in memory."""
+
 _POINTS: Final = "points"
-_RANGE: Final = re.compile(r"([^:]+):([^:]+)(?::(\d+))?")
+_SCRATCH: Final = "workers"
+"""Folder of the worker processes in that of a sweep, while they run."""
+
+_RANGE: Final = re.compile(r"([^:]+):([^:]+)(?::(\d{1,18}))?")
 _QUANTITY: Final = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
 
@@ -79,7 +85,7 @@ class Sweep:
         file = Path(folder) / DESCRIPTION
         try:
             return cls._stated(Path(folder), file.read_text(encoding="utf-8"))
-        except (ValueError, LookupError, TypeError):
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
             raise ValueError(f"{file}: is damaged; run the sweep again") from None
 
     @classmethod
@@ -258,7 +264,7 @@ def sweep(
             for key, one in zip(keys, studies, strict=True)
             if not _is_done(path := point_file(folder, key))
         }
-        _compute(list(tasks.values()), client, workers, tell)
+        _compute(list(tasks.values()), client, workers, tell, folder.resolve() / _SCRATCH)
     return Sweep._stated(folder, text)
 
 
@@ -274,12 +280,13 @@ def _compute(
     client: Client | None,
     workers: int | None,
     tell: Progress,
+    scratch: Path,
 ) -> None:
     """Compute the scenes of points that are not in the cache, then the points."""
     new = [one for one, *_ in tasks if isinstance(one, Study) and one.scene is None]
     scenes = {json.dumps(scene_inputs(one)): one for one in new}
     cuts = [(one,) for one in scenes.values() if not is_cut(one)]
-    with local_client(client, workers, max(len(tasks), len(cuts))) as computing:
+    with local_client(client, workers, max(len(tasks), len(cuts)), scratch) as computing:
         for step, function, arguments in (("cuts", _cut, cuts), ("points", compute_point, tasks)):
             for count, _ in enumerate(on_client(computing, function, arguments), 1):
                 tell(step, count / len(arguments))
@@ -290,9 +297,12 @@ def axis(values: str | Sequence[Any]) -> list[Any]:
     if not isinstance(values, str):
         return list(values)
     if (ends := _RANGE.fullmatch(values)) is None:
-        return [yaml.safe_load(one) for one in values.split(",")]
+        return [parse_yaml(one) for one in values.split(",")]
     first, last, count = ends.groups()
-    return [between(first, last, part) for part in np.linspace(0.0, 1.0, int(count or 2))]
+    number = int(count or 2)
+    if number > MOST_POINTS:
+        raise ValueError(f"{values}: makes {number} values, expected up to {MOST_POINTS}")
+    return [between(first, last, part) for part in np.linspace(0.0, 1.0, number)]
 
 
 def between(first: object, last: object, part: float) -> str | float:
@@ -364,6 +374,9 @@ def points_of(
     """Yield the settings of each point as a study takes them."""
     if not axes:
         raise ValueError("vary: name at least one setting")
+    count = prod(map(len, axes.values())) if method == "grid" else samples
+    if not 1 <= count <= MOST_POINTS:
+        raise ValueError(f"vary: makes {count} points, expected 1 to {MOST_POINTS}")
     if method == "grid":
         for values in product(*axes.values()):
             yield dict(zip(axes, values, strict=True))
@@ -453,7 +466,7 @@ def _record(path: Path) -> Mapping[str, Any] | None:
     """Return the content of a point's file; None if it is missing or damaged."""
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
-    except (FileNotFoundError, ValueError):
+    except (FileNotFoundError, ValueError, RecursionError):
         return None
     if not isinstance(record, dict):
         return None

@@ -16,7 +16,11 @@ _SECTIONS: Final = ("camera", "surface", "cutting")
 
 @dataclass(frozen=True)
 class InputSection(Part):
-    """Distribution of one setting about its value in the study."""
+    """Distribution of one setting about its value in the study.
+
+    Widths and values are texts in the setting's unit or relative to its value, which is known only
+    with the study; an `Input` has their numbers.
+    """
 
     standard: Annotated[
         float | str | None,

@@ -6,8 +6,11 @@ from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from itertools import islice
 from os import cpu_count
+from pathlib import Path
+from shutil import rmtree
 from typing import Any, Final, TypeAlias
 
+from chipglow.io.parent import end_with_parent
 from chipglow.text import needs_extra
 
 Client: TypeAlias = Any
@@ -29,17 +32,33 @@ def connected(scheduler: str) -> Client:
     return _distributed().Client(scheduler)
 
 
+def dask_setup(worker: Any) -> None:
+    """Let a worker of this machine end with the sweep; Dask calls it when the worker starts."""
+    end_with_parent()
+
+
 @contextmanager
-def local_client(client: Client | None, workers: int | None, most: int) -> Iterator[Client | None]:
-    """Yield the client, or one of new processes of this machine; None for this process."""
+def local_client(
+    client: Client | None, workers: int | None, most: int, scratch: Path
+) -> Iterator[Client | None]:
+    """Yield the client, or one of new processes of this machine; None for this process.
+
+    The new processes, of which there are up to `most`, keep their files in the folder `scratch`. It
+    is removed when they end, and before they start if a killed sweep left it.
+    """
     if client is not None or workers == 0 or most == 0:
         yield client
         return
     distributed = _distributed()
     dask: Any = import_module("dask")
     count = min(workers or cpu_count() or 1, most)
-    options = {"distributed.scheduler.allowed-failures": _ALLOWED_FAILURES}
+    options = {
+        "distributed.scheduler.allowed-failures": _ALLOWED_FAILURES,
+        "temporary-directory": str(scratch),
+    }
     with ExitStack() as stack:
+        rmtree(scratch, ignore_errors=True)
+        stack.callback(rmtree, scratch, ignore_errors=True)
         stack.enter_context(dask.config.set(options))
         try:
             cluster = stack.enter_context(
@@ -49,6 +68,7 @@ def local_client(client: Client | None, workers: int | None, most: int) -> Itera
                     env=_THREADS,
                     dashboard_address=":0",  # any free port
                     silence_logs="ERROR",
+                    preload=[__name__],
                 )
             )
             own = stack.enter_context(distributed.Client(cluster))

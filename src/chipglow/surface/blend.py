@@ -13,7 +13,7 @@ from numba import get_num_threads, njit
 from numpy.typing import NDArray
 
 from chipglow.scene import Material
-from chipglow.surface.texture import WIDTH, WRAP, emissivity_at, patch
+from chipglow.surface.texture import PADDED_SIZE, WRAP, emissivity_at, patch
 
 STRAIN_OF_WORKPIECE: Final = 0.3
 """Plastic strain up to which the workpiece's map holds alone."""
@@ -62,7 +62,7 @@ def _place(x, y, shift, scale, corner, across, down):  # type: ignore[no-untyped
         u, v = (x[i] - shift[0]) * scale, (y[i] - shift[1]) * scale
         before, above = np.floor(u), np.floor(v)
         across[i], down[i] = u - before, v - above
-        corner[i] = (np.int32(above) & WRAP) * np.int32(WIDTH) + (np.int32(before) & WRAP)
+        corner[i] = (np.int32(above) & WRAP) * np.int32(PADDED_SIZE) + (np.int32(before) & WRAP)
 
 
 @njit(**_FAST)
@@ -143,12 +143,16 @@ def blend_row(  # type: ignore[no-untyped-def]
                 _add_tabled(scratch[k], deviates, tables[n, k], result[n])
 
 
+_BLOCK_ROWS: Final = 16
+"""Rows of a block if several threads share the work."""
+
+
 def in_blocks(count: int, work: Callable[[int, int], None], size: int | None = None) -> None:
     """Work on rows (or columns) from a first up to a last number, a block in each call.
 
-    A block has `size` rows; by default 16, or all with one thread.
+    A block has `size` rows; by default `_BLOCK_ROWS`, or all with one thread.
     """
-    size = size or (count if get_num_threads() == 1 else 16)
+    size = size or (count if get_num_threads() == 1 else _BLOCK_ROWS)
     blocks = [(first, min(first + size, count)) for first in range(0, count, size)]
     if get_num_threads() == 1 or len(blocks) == 1:
         for first, last in blocks:

@@ -133,9 +133,11 @@ class FeatureSurface(FeatureSettings, Surface):
         if self.follow == "mean":
             shifts = _mean_shifts(scene)
         moves = ("material_x", "material_y") if self.follow == "material" else ()
+        features = Features((self,), scene.raster, times, shifts)
         return EmissivityField(
-            Features((self,), scene.raster, times, shifts),
+            features.emissivity,
             frozenset(("plastic_strain", "plastic_strain_rate", *moves)),
+            features=features,
         )
 
     def redrawn(self, number: int) -> Self:
@@ -174,7 +176,7 @@ class Features:
     shifts: NDArray[np.float64]
     """Shift right and up in m of the maps of workpiece, chip and shear band, (time, 3, 2)."""
 
-    def __call__(self, frame: Frame) -> NDArray[np.float32]:
+    def emissivity(self, frame: Frame) -> NDArray[np.float32]:
         """Return the emissivity of every sample of a frame for the first surface."""
         result: NDArray[np.float32] = self.emissivities(frame)[0]
         return result
@@ -250,10 +252,10 @@ class EmissivityStack:
     @cached_property
     def features(self) -> Features | None:
         """The features under all fields, if they have the same motion."""
-        bare = [field.bare for field in self.fields if isinstance(field.bare, Features)]
-        if len(bare) < len(self.fields) or not all(one.moves_like(bare[0]) for one in bare):
+        known = [field.features for field in self.fields if field.features is not None]
+        if len(known) < len(self.fields) or not all(one.moves_like(known[0]) for one in known):
             return None
-        return replace(bare[0], surfaces=tuple(one.surfaces[0] for one in bare))
+        return replace(known[0], surfaces=tuple(one.surfaces[0] for one in known))
 
     @property
     def required_fields(self) -> frozenset[str] | None:
@@ -266,8 +268,9 @@ class EmissivityStack:
         """Return the emissivity of every sample for every field, shape (field, y, x)."""
         if self.features is None:
             return np.stack([field.emissivity(frame) for field in self.fields])
-        bare = self.features.emissivities(frame)
-        return np.stack([f.modified(one, frame) for f, one in zip(self.fields, bare, strict=True)])
+        unmodified = self.features.emissivities(frame)
+        pairs = zip(self.fields, unmodified, strict=True)
+        return np.stack([field.modified(one, frame) for field, one in pairs])
 
 
 @dataclass(frozen=True)
@@ -276,7 +279,7 @@ class FeatureTrends(Modifier):
 
     To the emissivity of a sample comes, of each feature by its fraction, how far its line at the
     sample's temperature is from `EmissivityTrend.emissivity`, which the features must have as the
-    mean; a sum outside 0 to 1 becomes the nearer of these. The errors that a thermocouple or a
+    mean; a sum outside 0 to 1 becomes the nearer of these. The errors of a thermocouple or a
     calibration are the same for all features in a draw.
     """
 

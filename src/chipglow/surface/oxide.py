@@ -125,7 +125,7 @@ class OxideHistory:
         cell = max(
             _SAMPLES_PER_CELL * scene.raster.spacing,
             max(right - left, top - bottom) / _MOST_CELLS,
-            1e-12,
+            1e-12,  # m: a scene of one point
         )
         shape = ceil((top - bottom) / cell) + 1, ceil((right - left) / cell) + 1
         grown = np.zeros((len(scene.times), *shape), np.float32)

@@ -98,6 +98,7 @@ def _sections(raster: Raster, tool: Tool, elements: SideElements) -> _Sections:
     count = max(int(along.max() / raster.spacing) + 1, 0)
     foot = tool.rake_point((np.arange(count) + 0.5) * raster.spacing)
     step = raster.spacing / 2
+    # Lines half a sample apart miss no sample; the first is within the samples on the face.
     heights = np.arange(raster.spacing / 4, TOUCHING + step, step)
     section = np.floor(along / raster.spacing).astype(np.intp)
     beside = np.flatnonzero((section >= 0) & (section < count))
@@ -210,8 +211,7 @@ class SideShape(Modifier):
             if not touching.any():
                 return emissivity
             rows, columns = sections.rows[touching], sections.columns[touching]
-            # Where the chip ends there is nothing: what comes from there comes from the
-            # surroundings.
+            # Beyond the end of the chip is void, from which the light of the surroundings comes.
             void = frame.material[rows, columns] == Material.VOID
             values = emissivity[rows, columns].astype(np.float64)
             if self.rake_emissivity is not None:

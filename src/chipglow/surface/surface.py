@@ -4,7 +4,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Final, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from chipglow.quantities import Family, Part
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Scene
+
+if TYPE_CHECKING:
+    from chipglow.surface.feature import Features
 
 SURFACES: Final = Family("surface")
 """Emissivity models by their kind; other packages add theirs in the group ``chipglow.surface``."""
@@ -30,24 +33,27 @@ Change: TypeAlias = Callable[[NDArray[np.float32], Frame], NDArray[Any]]
 class EmissivityField:
     """The emissivity of one scene's samples, frame by frame; made by `Surface.prepare`."""
 
-    bare: Callable[[Frame], NDArray[np.float32]]
-    """Fraction of every sample of a frame, shape (y, x), from 0 to 1; 0 in the void."""
+    unmodified: Callable[[Frame], NDArray[np.float32]]
+    """Emissivity of every sample of a frame without `changes`, (y, x), 0 to 1; 0 in the void."""
     fields: frozenset[str] | None = None
     """Fields of a frame that are read besides temperature and material; by default all."""
     changes: tuple[Change, ...] = ()
     """Changes of the bare emissivity by modifiers, in order."""
     max_emissivity: float = 1.0
     """Over 1 if reflected light counts as emitted."""
+    features: "Features | None" = None
+    """The unmodified emissivity as textures of features, which the kernels of an exposure look up
+    themselves; without them, `unmodified` is called for every frame."""
 
     def emissivity(self, frame: Frame) -> NDArray[np.float32]:
         """Return the emissivity of every sample of a frame, shape (y, x); 0 in the void."""
-        return self.modified(self.bare(frame), frame)
+        return self.modified(self.unmodified(frame), frame)
 
-    def modified(self, bare: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
-        """Return a frame's emissivity of the bare one."""
+    def modified(self, emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
+        """Return a frame's emissivity with all `changes` of the unmodified one."""
         for change in self.changes:
-            bare = np.asarray(change(bare, frame), np.float32)
-        return bare
+            emissivity = np.asarray(change(emissivity, frame), np.float32)
+        return emissivity
 
 
 @dataclass(frozen=True)
@@ -180,11 +186,11 @@ class ModifiedSurface(Surface):
     ) -> EmissivityField:
         field, surface = self.bare.prepare(scene, band, reflected), self.bare
         for one in self.modifiers:
-            field = EmissivityField(
-                field.bare,
-                None if field.fields is None else field.fields.union(one.fields),
-                (*field.changes, one.change(surface, scene, band, reflected)),
-                max(field.max_emissivity, one.max_emissivity),
+            field = replace(
+                field,
+                fields=None if field.fields is None else field.fields.union(one.fields),
+                changes=(*field.changes, one.change(surface, scene, band, reflected)),
+                max_emissivity=max(field.max_emissivity, one.max_emissivity),
             )
             surface = surface.modified(one)
         return field

@@ -42,6 +42,7 @@ class Emissivity(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        # Only values of 0 and 1 reach (m (1 − m))^(1/2); a beta distribution stays below it.
         most = 0.9 * sqrt(self.mean * (1.0 - self.mean))
         if self.standard_deviation > most:
             raise ValueError(
@@ -84,7 +85,7 @@ def _beta_values(deviates: Array, mean: float, standard_deviation: float) -> Arr
 MAP_SIZE: Final = 128
 """Deviates across and down a map; with grains of 20 µm it repeats after 2.56 mm."""
 
-WIDTH: Final = MAP_SIZE + 4
+PADDED_SIZE: Final = MAP_SIZE + 4
 """Columns of a map with the border that the splines need."""
 
 WRAP: Final = MAP_SIZE - 1
@@ -158,7 +159,7 @@ def _enlarged_standard_deviation(nodes: NDArray[np.float64]) -> float:
 
 def padded(nodes: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return a periodic map with the nodes about its border, so that no index wraps, flat."""
-    around = np.arange(-1, WIDTH - 1) & WRAP
+    around = np.arange(-1, PADDED_SIZE - 1) & WRAP
     return np.ascontiguousarray(nodes[around[:, None], around]).ravel()
 
 
@@ -189,7 +190,7 @@ def patch(typing, nodes, corner, across, down):  # type: ignore[no-untyped-def]
         base = context.make_array(signature.args[0])(context, builder, array).data
         rows, total = weights(down), None
         for row in range(4):
-            start = builder.add(corner, ir.Constant(ir.IntType(64), row * WIDTH))
+            start = builder.add(corner, ir.Constant(ir.IntType(64), row * PADDED_SIZE))
             place = builder.bitcast(builder.gep(base, [start]), four.as_pointer())
             product = builder.fmul(builder.load(place, align=4), splat(rows, row), **fast)
             total = product if total is None else builder.fadd(total, product, **fast)
@@ -214,6 +215,6 @@ def _look_up(nodes, table, scale, x, y, result):  # type: ignore[no-untyped-def]
     for i in range(x.size):
         u, v = x[i] * scale, y[i] * scale
         left, above = np.floor(u), np.floor(v)
-        corner = (np.int64(above) & WRAP) * WIDTH + (np.int64(left) & WRAP)
+        corner = (np.int64(above) & WRAP) * PADDED_SIZE + (np.int64(left) & WRAP)
         deviate = patch(nodes, corner, np.float32(u - left), np.float32(v - above))
         result[i] = emissivity_at(deviate, table)

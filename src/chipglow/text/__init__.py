@@ -29,6 +29,7 @@ from chipglow.text.regular_file import check_regular as check_regular
 from chipglow.text.template import commented_yaml as commented_yaml, json_schema as json_schema
 from chipglow.text.yaml_file import (
     DescriptionError as DescriptionError,
+    parse_yaml as parse_yaml,
     read_small_text as read_small_text,
     read_yaml as read_yaml,
 )

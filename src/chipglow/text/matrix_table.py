@@ -146,13 +146,17 @@ def read_matrix(path: Path) -> Matrix:
     return Matrix(values, notes)
 
 
+_SHOWN: Final = 3
+"""Ranges of lines that a message lists if there are many."""
+
+
 def _places(lines: Sequence[_Line]) -> str:
     """Return the numbers of lines as text."""
     numbers = [line.number for line in lines]
     starts = [number for number in numbers if number - 1 not in numbers]
     ends = [number for number in numbers if number + 1 not in numbers]
     ranges = [f"{a}" if a == b else f"{a} to {b}" for a, b in zip(starts, ends, strict=True)]
-    shown = [*ranges[:3], "..."] if len(ranges) > 4 else ranges
+    shown = [*ranges[:_SHOWN], "..."] if len(ranges) > _SHOWN + 1 else ranges
     return f"line{'s' * (len(numbers) > 1)} {', '.join(shown)}"
 
 

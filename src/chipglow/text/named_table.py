@@ -33,7 +33,7 @@ class NamedTable:
 
     path: Path
     first: int
-    """Number of the line of names, from 1."""
+    """Line number of the column names, from 1."""
     names: tuple[str, ...]
     rows: list[tuple[int, str]]
     """Number and text of the line of each row."""

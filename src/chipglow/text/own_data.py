@@ -6,10 +6,10 @@ from typing import Any, Final
 from chipglow.text.memory import MemoryLimitError, check_memory
 
 HDF5_ERRORS: Final = (OSError, ValueError, LookupError, RuntimeError, TypeError, SystemError)
-"""What h5py and xarray raise at a damaged file."""
+"""Errors that h5py and xarray raise for a damaged file."""
 
-_MOST_OBJECTS: Final = 10_000
-"""Groups and datasets of a file that chipglow reads as a whole; its own have about thirty."""
+_MOST_OBJECTS: Final = 1000
+"""Names in the groups of a file that chipglow reads as a whole; its own files have up to 100."""
 
 _COPIES: Final = 4
 """Copies of the data that reading and conversion hold at a time."""
@@ -42,21 +42,26 @@ def check_own_data(path: Path) -> None:
 def check_bounds(path: Path, by_frame: bool = False) -> None:
     """Refuse an HDF5 file that does not fit into memory, by the sizes that its datasets declare.
 
-    Of a scene, which is read by frame, only one frame counts.
+    A scene is read frame by frame, so only one of its frames counts.
     """
     import h5py
 
     sizes: list[float] = []
+    names = 0
     with h5py.File(path, "r") as file:
 
         def count(name: str, item: Any) -> None:
-            is_data = isinstance(item, h5py.Dataset)
-            sizes.append(_size(name, item, by_frame) if is_data else 0.0)
-            if len(sizes) > _MOST_OBJECTS:
+            nonlocal names
+            if isinstance(item, h5py.Dataset):
+                sizes.append(_size(name, item, by_frame))
+                return
+            names += len(item)
+            if names > _MOST_OBJECTS:
                 raise MemoryLimitError(
                     f"has over {_MOST_OBJECTS} groups and variables, expected a scene or a result"
                 )
 
+        count("/", file)
         file.visititems(count)
         if by_frame:
             rows, columns = (float(file[axis].size) if axis in file else 0.0 for axis in "yx")

@@ -17,7 +17,7 @@ _HEAD: Final = 100_000
 """Bytes that hold the first two lines of any table whose columns have names."""
 
 _LONGEST_LINE: Final = 4_000_000
-"""Most characters of a line of a text file; a longer one is no table."""
+"""Maximum number of characters of a line; a file with a longer one is not a table."""
 
 _TOO_LONG: Final = re.compile(rf"(?m)^[^\r\n]{{{_LONGEST_LINE + 1}}}")
 _BYTE_ORDER_MARKS: Final = (
@@ -77,7 +77,7 @@ def _decoded(path: Path, raw: bytes) -> tuple[str, str]:
     """Return text and its encoding; the text of a file that is not text contains zeros."""
     encoding = next((name for mark, name in _BYTE_ORDER_MARKS if raw.startswith(mark)), "utf-8")
     for name, start in (("utf-16-le", 1), ("utf-16-be", 0)):
-        # Of the two bytes of a digit or separator in UTF-16, one is zero.
+        # One of the two bytes of a digit or separator in UTF-16 is zero.
         if encoding == "utf-8" and 2 * raw[start::2].count(0) > len(raw[start::2]):
             encoding = name
     try:

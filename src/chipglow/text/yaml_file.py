@@ -15,6 +15,18 @@ _FRACTION: Final = "tag:yaml.org,2002:float"
 _LARGEST_FILE: Final = 1_000_000
 """Size limit of small text files, in bytes."""
 
+_MOST_NODES: Final = 10_000
+"""Keys and values of a YAML text, those of aliases counted each time; ours have up to 700."""
+
+_MOST_LEVELS: Final = 50
+"""Sections within sections, through aliases too; ours have up to 7."""
+
+_LARGEST_WHOLE: Final = 10**300
+"""Largest absolute whole number; it is less than the largest double."""
+
+_UNFIT: Final = (LookupError, AttributeError, TypeError, ArithmeticError)
+"""Errors that the loader raises for values such as !!int "" or !!timestamp x."""
+
 
 class DescriptionError(ValueError):
     """An impossible description: names the file, the field and what was expected."""
@@ -42,36 +54,87 @@ def read_yaml(path: Path) -> Any:
 
 
 def parse_yaml(text: str) -> Any:
-    """Parse YAML with the safe loader."""
+    """Parse YAML with the safe loader, up to a number of nodes and levels."""
     try:
         return yaml.load(text, Loader=_Loader)
-    except ValueError as error:  # Such as an impossible date.
-        raise DescriptionError(f"{error}, expected YAML") from None
-    except (yaml.YAMLError, RecursionError) as error:
+    except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         problem = getattr(error, "problem", None) or "is not YAML"
         raise DescriptionError(f"{place}{problem}, expected YAML") from None
+    except ValueError as error:
+        raise DescriptionError(f"{error}, expected YAML") from None
+    except _UNFIT:
+        raise DescriptionError("a value does not fit its tag, expected YAML") from None
 
 
 class _Loader(yaml.SafeLoader):
-    """Loader that refuses duplicate keys and reads numbers as YAML 1.2: 4:8 is not 248."""
+    """Loader with limits that refuses duplicate keys and reads numbers as YAML 1.2: 4:8 is not 248.
 
-    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+    Nodes and levels are counted while the text is parsed, so that nothing is expanded before.
+    """
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._nodes = 0
+        self._open: list[int] = []
+        """Levels below each node that is not complete."""
+        self._sizes: dict[Any, tuple[int, int]] = {}
+        """Nodes of each complete node, itself included, and levels below it."""
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        mark, before = event.start_mark, self._nodes
+        if len(self._open) > _MOST_LEVELS:
+            raise _refused(f"has over {_MOST_LEVELS} levels of sections", mark)
+        if self.check_event(yaml.AliasEvent):
+            node = super().compose_node(parent, index)
+            if node not in self._sizes:
+                raise _refused("contains itself", mark)
+            nodes, levels = self._sizes[node]
+            self._nodes += nodes
+        else:
+            self._nodes += 1
+            self._open.append(0)
+            node = super().compose_node(parent, index)
+            levels = self._open.pop()
+            self._sizes[node] = self._nodes - before, levels
+        if self._open:
+            self._open[-1] = max(self._open[-1], levels + 1)
+        if len(self._open) + levels > _MOST_LEVELS:
+            raise _refused(f"has over {_MOST_LEVELS} levels of sections", mark)
+        if self._nodes > _MOST_NODES:
+            raise _refused(f"has over {_MOST_NODES} keys and values", mark)
+        return node
+
+    def compose_scalar_node(self, anchor: Any) -> Any:
+        node = super().compose_scalar_node(anchor)
+        if any("\ud800" <= character <= "\udfff" for character in node.value):
+            raise _refused("has half a character", node.start_mark)
+        return node
+
+    def compose_mapping_node(self, anchor: Any) -> Any:
+        node = super().compose_mapping_node(anchor)
         seen: set[str] = set()
         for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
             if key.value in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"duplicate key {key.value!r}", key.start_mark
-                )
+                raise _refused(f"duplicate key {key.value!r}", key.start_mark)
             seen.add(key.value)
-        return super().construct_mapping(node, deep=deep)
+        return node
 
     def construct_number(self, node: Any) -> Any:
         if ":" in node.value:
             return node.value
-        whole = node.tag == _WHOLE
-        return self.construct_yaml_int(node) if whole else self.construct_yaml_float(node)
+        if node.tag != _WHOLE:
+            return self.construct_yaml_float(node)
+        number = self.construct_yaml_int(node)
+        if abs(number) > _LARGEST_WHOLE:
+            raise _refused("the number is too large", node.start_mark)
+        return number
+
+
+def _refused(problem: str, mark: Any) -> yaml.YAMLError:
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=mark)
 
 
 for _tag in (_WHOLE, _FRACTION):

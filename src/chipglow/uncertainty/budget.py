@@ -265,6 +265,7 @@ def sobol_indices(
         results = np.full_like(results, np.nan)
     every = np.moveaxis(results, 2, 1)  # (function, output, sample)
     chosen = generator.integers(samples, size=(_RESAMPLES, samples))
+    # Ends of the 95 % interval.
     spread = np.quantile([_sobol(every[..., one]) for one in chosen], [0.025, 0.975], axis=0)
     variables = {
         name + end: (("output", "group"), one[order])

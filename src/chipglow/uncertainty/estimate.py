@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.special import stdtrit
 
-from chipglow.quantities import Array, Brief, brief
+from chipglow.quantities import ROUNDING, Array, Brief, brief
 from chipglow.uncertainty.component import Cause, Component, DistributionKind
 
 _MOST_FREEDOM: Final = 1e6
@@ -430,10 +430,10 @@ def factor(covariance: Array, name: str) -> Array:
     scale[scale == 0.0] = 1.0
     # Correlations, since the variance of a value in metres is lost in rounding next to kelvins.
     matrix = covariance / np.outer(scale, scale)
-    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9):
+    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=ROUNDING):
         raise ValueError(f"component {name}: covariance is not symmetric")
     variances, directions = np.linalg.eigh(matrix)
-    if variances.min(initial=0.0) < -1e-9:
+    if variances.min(initial=0.0) < -ROUNDING:
         raise ValueError(
             f"component {name}: covariance has a variance of {variances.min():.3g} in one "
             "direction, relative to the values' own, expected 0 or more"

@@ -231,7 +231,7 @@ class Inputs:
             if groups[0] != groups[1]:
                 raise ValueError(
                     f"correlations: {one} is in the group {groups[0]!r}, {two} in "
-                    f"{groups[1]!r}, expected the same group"
+                    f"{groups[1]!r}; both must be in the same group"
                 )
         # The variance of a sum is 0 if it is exactly known: rounding may make that less.
         if np.linalg.eigvalsh(self.correlation).min(initial=1.0) < -1e-9:

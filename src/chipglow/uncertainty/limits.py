@@ -11,7 +11,7 @@ _STATED_OUTSIDE: Final = 1e-4
 """Impossible part that is stated: a smaller one moves no end of an interval by a printed digit."""
 
 _NAMED: Final = 0.01
-"""Part of what is impossible that is beyond a limit which messages name."""
+"""Fraction of the impossible part beyond one limit at or above which messages name the limit."""
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,8 @@ class MonteCarlo(Brief):
     Parameters
     ----------
     mean, standard_uncertainty : ndarray
-        Of all trials; not finite if they do not exist, as with 2 degrees of freedom or fewer.
+        Mean and standard uncertainty of all trials; not finite if they do not exist, such as with
+        2 degrees of freedom or fewer.
     low, high : ndarray
         Ends of the probabilistically symmetric coverage interval.
     level : float

@@ -104,8 +104,9 @@ class FlatFieldCalibration(Brief):
     def netd(self, temperature: float) -> float:
         """Return the noise-equivalent temperature difference in K of a blackbody in K.
 
-        Temporal noise of the calibrated radiance, root mean square over the pixels, over dL/dT; at
-        least the noise of rounding to whole counts. NaN for a blackbody that saturates it.
+        Temporal noise of the calibrated radiance, root mean square over the pixels, divided by
+        dL/dT, and not below the noise of rounding to whole counts. NaN for a blackbody that
+        saturates it.
         """
         seen = float(self.point.band.radiance(temperature))
         if seen >= full_light(self.detector, self.point):
@@ -231,6 +232,7 @@ def lower_range_limit(detector: Detector, point: OperationPoint) -> float:
             "lower_limit: detector: its signal is never "
             f"{detector.least_signal:g} times its noise, expected a smaller least_signal"
         )
+    # To 1e-4 of the radiance: a limit is stated to about 1 K, of which this is a hundredth.
     found = ends[0] if excess(ends[0]) > 0 else scipy.optimize.bisect(excess, *ends, xtol=1e-4)
     return max(float(point.band.temperature(exp(found))), COLDEST)
 

@@ -31,7 +31,7 @@ in_tables: Final = partial(Parameter, quantity=TEMPERATURE, least=COLDEST, most=
 
 @dataclass(frozen=True, kw_only=True)
 class ExposureSettings(Part):
-    """How long and with which area the elements of a detector take light."""
+    """Exposure time, frame rate and light-sensitive area of the elements of a detector."""
 
     integration_time: Annotated[float, Parameter("Exposure time.", TIME)] = 10e-6
     frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY)] = 600.0

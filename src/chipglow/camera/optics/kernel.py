@@ -13,6 +13,9 @@ from chipglow.quantities import Array
 LARGEST_KERNEL: Final = 4097
 """Largest number of squares along a side of a kernel."""
 
+_LONGEST: Final = 0.1
+"""Longest length in m; a longer one is stated in another unit."""
+
 _ROUNDING: Final = 1e-9
 """Relative difference of values that are equal but for rounding."""
 
@@ -155,8 +158,8 @@ def half_maximum_width(line: Array) -> float:
 
 
 def check_length(name: str, value: float) -> None:
-    """Raise a ValueError unless a length is positive and at most 0.1 m."""
-    if not (isinstance(value, Real) and 0.0 < value <= 0.1):
+    """Raise a ValueError unless a length is positive and at most `_LONGEST`."""
+    if not (isinstance(value, Real) and 0.0 < value <= _LONGEST):
         raise ValueError(
-            f"psf: {name} must be positive and at most 0.1 m, not {value!r}; 8 um is 8e-6"
+            f"psf: {name} must be positive and at most {_LONGEST:g} m, not {value!r}; 8 um is 8e-6"
         )

@@ -45,6 +45,9 @@ FWHM_PER_SIGMA: Final = 2 * sqrt(2 * log(2))
 _FAR: Final = 30.0
 """Radius v beyond which the mean irradiance of diffraction rings falls as 1/r³, within 2 %."""
 
+_SAME_LIMIT: Final = 0.01
+"""Accepted relative difference of the limits of two bands: people state two or three digits."""
+
 PSFS: Final = Family("psf")
 """Point spread functions by kind; other packages register theirs in the group ``chipglow.psf``."""
 
@@ -135,6 +138,7 @@ class AnnularAperturePSF(PointSpreadFunction):
 
     @cached_property
     def fwhm(self) -> float:  # type: ignore[override]
+        # The profile falls below a half between these v, with any obscuration.
         half = scipy.optimize.brentq(lambda v: float(self._profile(np.array(v))) - 0.5, 0.1, 3.0)
         return 2 * float(half) * self._unit
 
@@ -177,7 +181,7 @@ class AnnularAperturePSF(PointSpreadFunction):
         """Radius v that encircles `ANNULAR_ENERGY`."""
         # Beyond the first rings, the fraction outside is 2 / (π v (1 − o)).
         far = 4 / (pi * (1 - self.obscuration) * (1 - ANNULAR_ENERGY))
-        v = np.linspace(0.0, far, ceil(20 * far))
+        v = np.linspace(0.0, far, ceil(20 * far))  # about 60 points per ring of width π
         clear = 1 - self.obscuration**2
         inside = scipy.integrate.cumulative_simpson(
             clear / 2 * self._profile(v) * v, x=v, initial=0.0
@@ -230,6 +234,9 @@ class MeasuredPSF(PointSpreadFunction):
     includes : tuple of str
         Effects that the measurement contains in addition to the optics: ``footprint`` for the
         sensitive area of a pixel, and kinds of `chipglow.camera.BLURS`.
+    band : Band, optional
+        Spectral band of the measurement. A camera with another one refuses the kernel, as
+        diffraction and focus depend on the wavelength. Unknown by default.
 
     Notes
     -----
@@ -243,6 +250,7 @@ class MeasuredPSF(PointSpreadFunction):
     spacing: float
     components: tuple[Component, ...] = field(default=(), repr=False)
     includes: tuple[str, ...] = ()
+    band: Band | None = None
     fwhm: float = field(init=False)
 
     def __str__(self) -> str:
@@ -261,6 +269,17 @@ class MeasuredPSF(PointSpreadFunction):
     def estimate(self) -> Estimate:
         """`weights` with `components`."""
         return Estimate(self.weights, self.components)
+
+    def for_camera(self, band: Band, magnification: float | None) -> "MeasuredPSF":
+        if self.band is not None and not _is_same(self.band, band):
+            raise ValueError(
+                f"psf: was measured in the band {_limits(self.band)}, expected that of the camera, "
+                f"{_limits(band)}"
+            )
+        return self
+
+    def in_band(self, band: Band) -> "MeasuredPSF":
+        return replace(self, band=None)
 
     @classmethod
     def from_file(
@@ -284,9 +303,8 @@ class MeasuredPSF(PointSpreadFunction):
             )
         try:
             if spacing is None:
-                estimate, spacing, stated = _read_netcdf(path)
-                included = stated if includes is None else includes
-                return cls(estimate.values, spacing, estimate.components, included)
+                psf = _read_netcdf(path)
+                return psf if includes is None else replace(psf, includes=includes)
             return cls(_read_array(path), spacing, includes=includes or ())
         except (ValueError, EOFError, MemoryError, KeyError, RuntimeError) as error:
             raise ValueError(f"psf: {path} is not a kernel: {error}") from error
@@ -377,7 +395,11 @@ class AiryAperture(ApertureChoice):
 @PSFS.part
 @dataclass(frozen=True)
 class MeasuredPSFFile(PSFChoice):
-    """A kernel from a file."""
+    """A kernel from a file.
+
+    It states what the file leaves open: None is for what a .nc file states. `MeasuredPSF` has the
+    values.
+    """
 
     kind = "measured"
     example = "{kind: measured, file: psf.nc}  of chipglow psf; .npy or .csv with spacing: 1 um"
@@ -405,7 +427,19 @@ class MeasuredPSFFile(PSFChoice):
         object.__setattr__(self, "psf", psf)
 
     def for_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
-        return self.psf
+        try:
+            return self.psf.for_camera(band, magnification)
+        except ValueError as error:
+            raise ValueError(f"{self.file}: {error}") from None
+
+
+def _is_same(band: Band, other: Band) -> bool:
+    limits = (band.lower, other.lower), (band.upper, other.upper)
+    return all(abs(one - two) <= _SAME_LIMIT * two for one, two in limits)
+
+
+def _limits(band: Band) -> str:
+    return f"{WAVELENGTH.text(band.lower)} to {WAVELENGTH.text(band.upper)}"
 
 
 def jinc(v: Array) -> Array:
@@ -446,12 +480,12 @@ def _read_array(path: Path) -> Array:
             return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
     frames = read_matrix(path).values
     if len(frames) > 1:
-        raise ValueError(f"{path}: has {len(frames)} matrices, expected one")
+        raise ValueError(f"{path}: has {len(frames)} matrices, must have 1")
     return np.asarray(frames[0])
 
 
-def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:
-    """Return kernel with uncertainty components, spacing and `includes`."""
+def _read_netcdf(path: Path) -> MeasuredPSF:
+    """Read a kernel with its uncertainty components, and what is stated of it."""
     if not path.is_file():
         raise FileNotFoundError(ENOENT, "there is no such file", str(path))
     try:
@@ -460,8 +494,11 @@ def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:
         with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as data:
             kernel = data["kernel"].attrs
             stated = tuple(str(kernel.get("includes", "")).split())
-            return from_xarray(data, "kernel"), float(kernel["spacing"]), stated
+            limits = kernel.get("band_lower"), kernel.get("band_upper")
+            estimate, spacing = from_xarray(data, "kernel"), float(kernel["spacing"])
     except ValueError:
         raise
     except HDF5_ERRORS as error:
         raise ValueError(f"truncated, or not a NetCDF-4 file: {error}") from error
+    band = None if None in limits else Band(*map(float, limits))
+    return MeasuredPSF(estimate.values, spacing, estimate.components, stated, band)

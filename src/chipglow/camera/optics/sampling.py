@@ -9,10 +9,21 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from chipglow.quantities import Array
+from chipglow.quantities.units import LENGTH
 from chipglow.scene import Raster
+from chipglow.text import check_memory
 
 _ROUNDING: Final = 1e-6
 """Lengths below this fraction of a pixel or sample are rounding errors."""
+
+_FEW_PIXELS: Final = 1e6
+"""Pixels up to which no memory is compared: no machine lacks the 0.1 GB."""
+
+_BYTES_A_PIXEL: Final = 100.0
+"""Memory of a measured exposure a pixel: twelve images in double precision."""
+
+_BYTES_AN_OVERLAP: Final = 40.0
+"""Memory a pixel and sample along an axis: five arrays in double precision."""
 
 LEAST_COVERED: Final = 0.05
 """Part of a sample's width that a pixel must cover for the sample to count in its maximum.
@@ -34,6 +45,8 @@ def overlap_lengths(left: Array, width: float, samples: int, spacing: float) -> 
     return np.where(end - begin > _ROUNDING * min(width, spacing), end - begin, 0.0)
 
 
+# Kept because a raster checks its numbers, and one image asks for its pixels six times.
+@lru_cache(maxsize=64)
 def sensor_raster(
     scene: Raster, pitch: float, offset: tuple[float, float], shape: tuple[int, int] | None
 ) -> Raster:
@@ -41,6 +54,12 @@ def sensor_raster(
     left, right, bottom, top = scene.extent
     room = (top - bottom - offset[1], right - left - offset[0])
     rows, columns = (int(length / pitch + _ROUNDING) for length in room)
+    if shape is None and rows * columns > _FEW_PIXELS:
+        overlaps = float(rows) * scene.rows + float(columns) * scene.columns
+        check_memory(
+            f"camera.pitch: {LENGTH.text(pitch)} makes {float(rows) * columns:.2g} pixels and",
+            _BYTES_A_PIXEL * rows * columns + _BYTES_AN_OVERLAP * overlaps,
+        )
     if min(offset) < 0 or min(rows, columns) < 1:
         raise ValueError(
             f"camera: pitch of {1e6 * pitch:g} um at an offset of {1e6 * offset[0]:g}, "

@@ -131,6 +131,7 @@ class VeilPSF(PointSpreadFunction):
         return 2 * self._width * sqrt(2 ** (2 / 3) - 1)
 
     def kernel(self, spacing: float) -> Array:
+        # 99 % of the light falls within 100 widths w: w / (r² + w²)^(1/2) of it falls beyond r.
         half = half_size(100 * self._width, spacing)
         return poisson_squares(spacing, half, half, self._width, self._width, beyond=False)
 

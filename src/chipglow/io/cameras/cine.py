@@ -39,12 +39,15 @@ _SETUP: Final = layout(
     shutter=("<u4", 1568),
 )
 _BLOCK: Final = np.dtype([("size", "<u4"), ("kind", "<u2"), ("more", "<u2")])
+
 _TIMES, _EXPOSURES = 1002, 1003
+"""Kinds of the blocks of times and exposure times."""
 
 _TICK: Final = 2.0**-32
 """Unit of times in s."""
 
 _PACKED_10, _PACKED_12 = 256, 1024
+"""Codes of packed pictures of 10 and 12 bits."""
 
 
 class Cine(CameraFile):
@@ -86,6 +89,7 @@ class Cine(CameraFile):
                 f"{self.path}: is compressed or in colours, expected plain grey pictures"
             )
         self.upward = False
+        # Pixels that share whole bytes, and bits of each.
         packed = {_PACKED_10: (4, 10), _PACKED_12: (2, 12)}.get(self.packing)
         if packed and width % packed[0] == 0:
             self.size, self.bits = height * width * packed[1] // 8, 12
@@ -147,7 +151,7 @@ class Cine(CameraFile):
     def facts(self, chosen: range) -> dict[str, Any]:
         exposures = self._of_frames(_EXPOSURES, "<u4")
         if exposures is None:
-            integration_time = self.setup["shutter"] * 1e-9 or None
+            integration_time = self.setup["shutter"] * 1e-9 or None  # ns
         else:
             integration_time = self.common_exposure(exposures[list(chosen)] * _TICK)
         return {

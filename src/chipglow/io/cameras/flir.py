@@ -45,6 +45,7 @@ _MOST_RECORDS: Final = 1000
 """Most records of a frame; more are a damaged file."""
 
 _RAW, _CAMERA = 1, 32
+"""Kinds of records: counts, and settings of the camera."""
 
 _RAW_HEADER: Final = 32
 """Bytes before the counts of a record."""
@@ -189,6 +190,7 @@ class Flir(CameraFile):
         if self.complete == 1:
             return np.zeros(1)
         stamps = np.array([self._moment(number) for number in chosen]) - self._moment(0)
+        # Stamps are whole milliseconds.
         return self.stamped(chosen, np.round(stamps, 3), self.camera_fields(chosen[0])["rate"])
 
     def facts(self, chosen: range) -> dict[str, Any]:
@@ -209,6 +211,7 @@ class Flir(CameraFile):
             if text := text_of(fields[part]):
                 self.notes.remarks.append(f"{part.capitalize()}: {text}.")
         low, high = fields["coldest"], fields["hottest"]
+        # Above 10,000 K the fields are not a range of the camera.
         if 0 < low < high < 10_000:
             self.notes.remarks.append(
                 f"The camera was set to measure from {low - ZERO_CELSIUS:g} to "
@@ -258,6 +261,7 @@ def _through_air(
     names = ("alpha_1", "beta_1", "alpha_2", "beta_2", "air_part")
     alpha_1, beta_1, alpha_2, beta_2, part = constants = [fields[name] for name in names]
     celsius = temperature - ZERO_CELSIUS
+    # Beyond these limits, in °C and m, the fields are not the state of the air.
     known = isfinite(sum(constants)) and -100 < celsius < 100
     if not known or not (0 <= distance < 1e6 and 0 <= humidity <= 1):
         return 1.0

@@ -18,6 +18,7 @@ from chipglow.io.sources import SourceError
 from chipglow.io.sources.file_names import files_of
 from chipglow.io.sources.source import head_of, reading
 from chipglow.quantities import of_other_packages
+from chipglow.text import check_regular
 
 _HEAD: Final = 520
 """Bytes by which a kind of file is recognised: those of HDF5 may follow 512 of the user's."""
@@ -186,6 +187,7 @@ def read_recording(
         void_value=void_value,
     )
     path = Path(path)
+    check_regular(path)
     if format is not None and format not in camera_formats():
         raise ValueError(f"format: is {format!r}, expected one of {', '.join(camera_formats())}")
     kind = format or find_format(path)

@@ -44,6 +44,12 @@ _RATE_UNIT: Final = 1e-3
 _SUBSECOND_UNIT: Final = 1e-7
 """Unit of the fraction of a second in s."""
 
+_TICKS: Final = 10_000_000
+"""Number of these units per second."""
+
+_FEWEST_COLUMNS: Final = 64
+"""Columns with which two lines of a picture hold the 256 bytes of a header."""
+
 _FIRST_WITH_TIME: Final = 10
 """Major version from which headers state the time."""
 
@@ -189,10 +195,10 @@ def write_hcc(path: str | Path, recording: Recording) -> None:
     """
     target = Path(path)
     count, height, width = recording.signal.shape
-    if not 64 <= width <= _LARGEST_COUNT or height > _LARGEST_COUNT:
+    if not _FEWEST_COLUMNS <= width <= _LARGEST_COUNT or height > _LARGEST_COUNT:
         raise ValueError(
-            f"{target}: signal has {width} columns and {height} rows, Telops' HCC has 64 to "
-            f"{_LARGEST_COUNT} columns and up to {_LARGEST_COUNT} rows"
+            f"{target}: signal has {width} columns and {height} rows, Telops' HCC has "
+            f"{_FEWEST_COLUMNS} to {_LARGEST_COUNT} columns and up to {_LARGEST_COUNT} rows"
         )
     samples, exponent, offset = _samples(target, recording)
     headers = _headers(target, recording, width, height, count)
@@ -227,9 +233,9 @@ def _samples(path: Path, recording: Recording) -> tuple[NDArray[np.uint16], int,
 
 def _headers(path: Path, recording: Recording, width: int, height: int, count: int) -> NDArray[Any]:
     # A camera's clock never shows 0 seconds: readers take that for a header without time.
-    ticks = np.round(recording.times / _SUBSECOND_UNIT).astype(np.int64) + 10_000_000
+    ticks = np.round(recording.times / _SUBSECOND_UNIT).astype(np.int64) + _TICKS
     steps = np.diff(recording.times)
-    if ticks.min() < 10_000_000 or (np.diff(ticks) <= 0).any() or ticks.max() >= 10_000_000 * 2**32:
+    if ticks.min() < _TICKS or (np.diff(ticks) <= 0).any() or ticks.max() >= _TICKS * 2**32:
         raise ValueError(f"{path}: times do not ascend from 0 in steps of 0.1 us or more")
     headers = np.zeros(count, _HEADER)
     headers["signature"] = b"TC"
@@ -239,7 +245,7 @@ def _headers(path: Path, recording: Recording, width: int, height: int, count: i
     headers["mode"] = _WRITTEN_MODE[recording.quantity]
     headers["exposure"] = round((recording.integration_time or 0.0) / _EXPOSURE_UNIT)
     headers["rate"] = round(min(1 / (np.median(steps) * _RATE_UNIT), 2**32 - 1)) if count > 1 else 0
-    headers["seconds"], headers["subseconds"] = np.divmod(ticks, 10_000_000)
+    headers["seconds"], headers["subseconds"] = np.divmod(ticks, _TICKS)
     saturation = recording.saturation
     if saturation is not None and 8 <= log2(saturation + 2) <= 16 and log2(saturation + 2) % 1 == 0:
         headers["resolution"] = round(log2(saturation + 2))

@@ -57,7 +57,7 @@ _LOCK_IN: Final = (1220, 3907, 1204, 2382)
 """First values of a line of lock-in data."""
 
 _DAY: Final = 86_400.0
-"""Seconds of a day, after which the clock begins anew."""
+"""Seconds per day, after which the clock restarts at 0."""
 
 _STAMPED: Final = 0.002
 """Two stamps of whole milliseconds may be off by that much in s."""
@@ -166,6 +166,7 @@ class Ptw(CameraFile):
     def _stated_band(self) -> Band | None:
         """Return the camera's band, whose unit the file does not state: um presumably."""
         low, high = self.header["cut_on"], self.header["cut_off"]
+        # Other numbers are not limits of a band in µm.
         return Band(1e-6 * low, 1e-6 * high) if 0.1 < low < high < 100 else None
 
     def _note_header(self, lock_in: bool) -> None:

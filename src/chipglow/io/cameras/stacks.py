@@ -235,7 +235,7 @@ def _dataset(
 
 
 def _is_temperature(stated: Stated) -> bool:
-    """Return whether a file may hold temperatures, by what the user states."""
+    """Return whether a file may hold temperatures according to the user's statements."""
     unit = recording_unit(stated.unit or "")
     return stated.quantity in (None, "temperature") and (unit is None or unit[0] == "temperature")
 

@@ -2,14 +2,14 @@
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any, Final, Literal, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, InstanceOf, PlainSerializer, WithJsonSchema
 
-from chipglow.io.sources.source import SourceError, naming
+from chipglow.io.sources.source import Source, SourceError, naming
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import POSITION, SI, Unit, is_bare_number, parse_unit
 from chipglow.scene import READABLE
@@ -322,3 +322,21 @@ def note_other_unit(short: str, text: str | None, notes: Notes, contradicts: boo
     if text is not None:
         place = notes.warnings if contradicts else notes.remarks
         place.append(f"{short} is in {text!r}; the given unit is used instead.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlacedSource(Source):
+    """A source whose times and axes an import states."""
+
+    interval: float | None = None
+    """Time from frame to frame in s, in place of the times of the files."""
+    placement: Placement = field(default_factory=Placement)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NamedSource(PlacedSource):
+    """A source whose fields have names and units."""
+
+    names: Mapping[str, str] = field(default_factory=dict)
+    """Names in the files by names in a scene."""
+    units: Units = field(default_factory=Units)

@@ -1,4 +1,4 @@
-"""What no scene and no measurement can be: limits that all readers share."""
+"""Limits of plausible scenes and measurements, shared by all readers."""
 
 from math import isfinite
 from typing import Any, Final
@@ -55,7 +55,7 @@ def check_sides(label: object, rows: int, columns: int) -> None:
 
 
 def doubt_of_size(subject: str, size: float, setting: str) -> list[str]:
-    """Return what to say of an image of a size in m, if it is unusual."""
+    """Return a warning if the size of an image in m is unusual."""
     smallest, largest = _USUAL_SIZES
     if smallest <= size <= largest:
         return []

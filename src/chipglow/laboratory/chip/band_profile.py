@@ -331,7 +331,7 @@ def _laid(line: Line | None, distance: Array) -> Array:
     """Return points of a line at these distances, NaN beyond its ends."""
     if line is None:
         return np.full((distance.size, 2), nan)
-    slack = 1e-9 * float(line.distance[-1])
+    slack = 1e-9 * float(line.distance[-1])  # rounding
     beyond = (distance < line.distance[0] - slack) | (distance > line.distance[-1] + slack)
     columns = [np.interp(distance, line.distance, line.points[:, axis]) for axis in (0, 1)]
     return np.where(beyond[:, None], nan, np.stack(columns, axis=1))

@@ -29,6 +29,9 @@ LEAST_PROMINENCE: Final = 10.0
 SHORTEST: Final = 15.0
 """Smallest length of a band's ridge in pixels."""
 
+_FEWEST_POINTS: Final = 5
+"""Fewest points of a ridge: the number that local parabolas smooth."""
+
 _SCALES: Final = (6e-6, 12e-6, 18e-6)
 """Standard deviations in m of the Gaussians whose second derivatives detect ridges: for bands of
 different widths."""
@@ -210,7 +213,7 @@ def _profiles(
 def _within(points: Array, image: ThermalImage) -> Array:
     """Return the points from the first to the last whose pixel is usable."""
     kept = np.flatnonzero(nearest(image.usable, image.raster, points) == 1)
-    if kept.size < 5:
+    if kept.size < _FEWEST_POINTS:
         raise NoShearBandError(_NO_RIDGE)
     return points[kept[0] : kept[-1] + 1]
 

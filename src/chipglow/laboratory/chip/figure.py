@@ -19,23 +19,42 @@ if TYPE_CHECKING:
     from chipglow.laboratory.chip.rake_grid import RakeGrid
 
 _HEIGHT: Final = 3.8
+"""Height in inches of the figure of a grid."""
+
 _BAND_HEIGHT: Final = 4.2
+"""Height in inches of the figure of a shear band."""
+
 _AROUND: Final = 60e-6
+"""Margin in m around the grid or the band in the image."""
+
 _ASIDE: Final = 0.08
+"""Distance between the bars of two depths, in sides of a square: they do not hide each other."""
+
 _MOST_BARS: Final = 20
 """Squares along the face up to which each has a bar."""
 _MARKERS: Final = "osD^vP*X"
+
 _LEGEND_COLUMNS: Final = 3
+"""Columns of a legend."""
+
 _MOST_NAMES: Final = 12
+"""Frames up to which each has a name in the legend."""
+
+_BRIGHTEST: Final = 0.9
+"""Fraction of the colour map that is used: its end is too bright for a line on white."""
+
 _COLOURS: Final = matplotlib.colors.ListedColormap(
-    matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, 256))
+    matplotlib.colormaps["viridis"](np.linspace(0.0, _BRIGHTEST, 256))
 )
+"""Colours of frames over the time, as many as 8 bits distinguish."""
+
 _LINES: Final = {
     Stage.DEVELOPING: (0, (4, 2)),
     Stage.DEVELOPED: "solid",
     Stage.MOVED: (0, (1, 1.5)),
     Stage.NONE: "solid",
 }
+"""Line styles; dashes are lengths and gaps in line widths."""
 
 
 def draw_rake_grid(measurement: Measurement, grid: "RakeGrid") -> Figure:
@@ -76,7 +95,7 @@ def draw_rake_profiles(axes: Axes, grid: "RakeGrid") -> None:
     """Draw the profiles of a grid on axes, without their legend."""
     mean, bars = grid.frame_mean - ZERO_CELSIUS, grid.bars
     uncertainty = grid.frame_estimate.standard_uncertainty
-    colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, grid.depth.size))
+    colours = matplotlib.colormaps["viridis"](np.linspace(0.0, _BRIGHTEST, grid.depth.size))
     # Many bars would hide each other: those of the depths take turns.
     turns = grid.depth.size if grid.along.size > _MOST_BARS else 1
     for m, depth in enumerate(grid.depth):

@@ -17,7 +17,7 @@ from chipglow.scene import Raster, ToolGeometry
 from chipglow.text import Notes
 
 _REACH: Final = 6
-"""Pixels of a row on either side of a line that tell how well it fits."""
+"""Pixels of a row on either side of a line in which its fit is judged."""
 
 _SEARCH: Final = radians(20.0)
 """Largest difference of the rake angle from the assumed one, in rad."""
@@ -35,11 +35,13 @@ _DECAY_LENGTHS: Final = (2.0, 6.0)
 """Distances in pixels over which the fitted courses fall off with the distance from the face."""
 
 _PLACE_RANGE: Final = 3.0
-"""Largest change of the place of a line in the fit, in pixels: half of what its pixels reach."""
+"""Largest change of the place of a line in the fit, in pixels: half of `_REACH`."""
 
 _BLURS: Final = (0.4, 3.0)
-"""Smallest and largest standard deviation of the fitted blur in pixels: more than the 0.29 of
-a pixel's own area, and half of what the pixels reach."""
+"""Smallest and largest standard deviation of the fitted blur in pixels.
+
+The smallest is above the 0.29 of a square pixel, 12^(-1/2); the largest is half of `_REACH`.
+"""
 
 _BLUR_STARTS: Final = (0.5, 2.9)
 """Range of the blur from which a fit starts, within that of the fit."""
@@ -224,7 +226,8 @@ def _gain(windows: Array, place: Array, blur: float, image: Array) -> Array:
 
 def _level(windows: Array, image: Array) -> Array:
     """Return the mean radiance of each window, kept off 0 by 2 % of the brightest in the image."""
-    return np.asarray(windows.mean(axis=-1) + _DARK_FRACTION * np.percentile(image, 99.0))
+    bright = np.percentile(image, 99.0)  # the maximum may be a defective pixel
+    return np.asarray(windows.mean(axis=-1) + _DARK_FRACTION * bright)
 
 
 def _parabolas(offset: Array, blur: float) -> Array:

@@ -47,7 +47,9 @@ RAKE_BUDGET: Final = (CALIBRATION, *TOOL_BUDGET)
 """Lines of the budget of a square in one frame."""
 
 _DIMS: Final = ("time", "depth", "along")
+
 _ROUNDING: Final = 1e-6
+"""Part of a square that rounding may add to or take from a position."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

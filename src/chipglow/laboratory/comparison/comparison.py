@@ -464,7 +464,7 @@ def _fits(labels: Sequence[str], grid: Readings | None, band: Readings | None) -
     if grid is not None and grid.depth is not None:
         face = np.zeros(grid.measured.values.shape, dtype=np.bool_)
         face[0] = True
-        reach = grid.depth[0] * 2e6
+        reach = grid.depth[0] * 2e6  # in µm; the centre of a square is half as deep as its end
         asked.append((f"at the rake face, up to {reach:.3g} µm deep", grid, face))
         asked.append((f"in the chip, over {reach:.3g} µm from the face", grid, ~face))
     if band is not None:

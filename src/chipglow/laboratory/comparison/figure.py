@@ -62,7 +62,8 @@ def _draw_values(
     x, values = 1e6 * place, measured.values - ZERO_CELSIUS
     axes.plot(x, values, "k.", markersize=4, label="measured")
     expanded = COVERAGE * measured.standard_uncertainty
-    drawing.shade(axes, x, values, expanded, GREY, 0.3, "expanded uncertainty, k = 2")
+    label = "expanded uncertainty, k = 2"
+    drawing.shade(axes, x, values, expanded, GREY, opacity=0.3, label=label)
     for reading, label, colour in zip(simulated, labels, cycle(COLOURS), strict=False):
         values = reading.values - ZERO_CELSIUS
         axes.plot(x, values, color=colour, label=label)

@@ -22,11 +22,17 @@ if TYPE_CHECKING:
 _PANEL_WIDTH: Final = 2.7
 """Width of an image in inches."""
 
+_IMAGE_HEIGHTS: Final = (1.0, 5.0)
+"""Smallest and largest height of an image in inches."""
+
 _LABEL_HEIGHT: Final = 0.75
 """Height in inches of title and labels of an image."""
 
 _LINES_HEIGHT: Final = 2.6
 """Height in inches of the panel of lines."""
+
+_LINE_POINTS: Final = 50
+"""Points of a line over the temperature with its band of uncertainty, which is curved."""
 
 _SLENDERNESS: Final = 3.0
 """Height over width of a region from which its name is written upright."""
@@ -44,7 +50,8 @@ def draw_emissivity(
 ) -> Figure:
     """Draw the radiance temperature with the regions, and the emissivity."""
     raster = found.raster
-    height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, 1.0), 5.0) + _LABEL_HEIGHT
+    least, most = _IMAGE_HEIGHTS
+    height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, least), most) + _LABEL_HEIGHT
     with drawing.style():
         figure = drawing.new_figure(height + (_LINES_HEIGHT if lines else 0.0))
         parts: Any = (
@@ -177,7 +184,7 @@ def _draw_lines(axes: Axes, lines: "Sequence[EmissivityLine]", colours: Sequence
             color=colour,
             label=line.name,
         )
-        along = np.linspace(celsius.min(), celsius.max(), 50)
+        along = np.linspace(celsius.min(), celsius.max(), _LINE_POINTS)
         found = line.at(along + ZERO_CELSIUS)
         axes.plot(along, found.values, color=colour)
         drawing.shade(axes, along, found.values, 2 * found.standard_uncertainty, colour)

@@ -37,7 +37,7 @@ _MANY_LEFT_OUT: Final = 0.05
 def area_estimate(mean: float, values: Array, identity: str, noise: float = nan) -> Estimate:
     """Return the mean of an area with its random component, by an analysis of variance.
 
-    `noise` is that of a single pixel, which a single frame does not show.
+    `noise` is the noise of a single pixel, which a single frame does not show.
     """
     observations, pixels = values.shape
     if observations == 1:
@@ -119,7 +119,7 @@ class UsedPixels(Brief):
 
 
 def used_pixels(area: Area, radiance: Array, flags: NDArray[np.uint8]) -> UsedPixels:
-    """Return the pixels of an area that can be used; raise ValueError if there is none.
+    """Return the usable pixels of an area; raise ValueError if it has none.
 
     `radiance` in W/(m² sr) has the shape (observation, y, x).
     """

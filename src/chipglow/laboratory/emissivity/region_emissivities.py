@@ -74,7 +74,9 @@ def determine_emissivities(
 ) -> RegionEmissivities:
     """Determine the emissivity of regions of a heated object."""
     if len(heatings) != len(measurements):
-        raise ValueError(f"{len(heatings)} heatings for {len(measurements)} images, expected one")
+        raise ValueError(
+            f"{len(heatings)} heatings for {len(measurements)} images; each image needs one"
+        )
     check_same_pixels(measurements, "emissivity", names)
     groups: dict[Heating, list[Measurement]] = {}
     for measurement, heating in zip(measurements, heatings, strict=True):

@@ -41,7 +41,10 @@ class CircleSection(Part):
 
 @dataclass(frozen=True)
 class RegionSection(Part):
-    """One region: a polygon, a rectangle or a circle."""
+    """One region: a polygon, a rectangle or a circle.
+
+    Its name is its key in the file, and each shape is a key of its own; a `Region` has one shape.
+    """
 
     polygon: Annotated[tuple[PointField, ...] | None, Parameter("Corners in order.")] = None
     rectangle: Annotated[

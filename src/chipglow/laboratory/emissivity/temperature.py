@@ -416,7 +416,7 @@ def _emissivity_of_area(
             "by the line of its emissivity, use an emissivity that falls less with the temperature"
         )
     ends = kelvins[hotter[0] - 1 : hotter[0] + 1]
-    return line.at(scipy.optimize.brentq(excess, *ends, xtol=1e-6))
+    return line.at(scipy.optimize.brentq(excess, *ends, xtol=1e-6))  # in K
 
 
 def _correlation(

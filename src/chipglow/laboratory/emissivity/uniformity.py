@@ -63,8 +63,8 @@ def uniformity(mask: NDArray[np.bool_], values: Array) -> Uniformity:
 
     Notes
     -----
-    A surface of second order is fitted to the mean of the frames. Its variance over the area, less
-    the part that the residuals would give it by chance, is that of the uneven radiance. If a
+    A surface of second order is fitted to the mean of the frames. Its variance over the area,
+    minus the part that random residuals cause, is the variance of the uneven radiance. If a
     fraction f up to a half of the area is off by D, as over an edge, the mean is off by f D, and
     the standard deviation is about (f (1 − f))^(1/2) D, which is more.
 

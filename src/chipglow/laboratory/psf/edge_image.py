@@ -41,6 +41,30 @@ _LEAST_PILE: Final = 10
 _MANY_CLIPPED: Final = 0.02
 """Fraction of clipped pixels of a distance from the edge, above which this distance is left out."""
 
+_SMALLEST_SIDE: Final = 8
+"""Smallest side of a region in pixels."""
+
+_FEWEST_PIXELS: Final = 40
+"""Fewest pixels of an edge: ten for each of its four parameters."""
+
+_PILE_RATIO: Final = 3
+"""Ratio of the pixels of the largest value to those of the next and the smallest at a limit."""
+
+_LEAST_OUTLIER: Final = 0.2
+"""Smallest residual of an outlier over the step: a wrong model leaves less."""
+
+_MOST_OUTLIERS: Final = 0.01
+"""Largest fraction of outliers; more are not dead pixels but an object that is not an edge."""
+
+_CLEAR_BLOCK: Final = 7
+"""Residual of a block, in units of its noise, that noise does not explain."""
+
+_CLEAR_BEND: Final = 4
+"""Sagitta in standard uncertainties that is not noise: one straight edge in 16 000 has it."""
+
+_LEAST_BEND: Final = 0.05
+"""Smallest sagitta in pitches of which a warning is given."""
+
 _WHOLE_SQUARE: Final = "The whole square of a pixel takes light (fill factor 1)."
 
 
@@ -59,8 +83,8 @@ class EdgeImage(Brief):
     """Which pixels have no value, are too bright or are too dark for the camera, shape (y, x)."""
     footprint: float
     """Side of a pixel's sensitive square in m."""
-    wavelength: float | None
-    """Middle of the camera's band in m."""
+    band: Band | None
+    """The camera's band."""
     name: str
     """Its name in messages."""
     unit: str = "W/(m² sr)"
@@ -71,6 +95,11 @@ class EdgeImage(Brief):
     def pitch(self) -> float:
         """Distance between pixels in m."""
         return float(self.x[1] - self.x[0])
+
+    @property
+    def wavelength(self) -> float | None:
+        """Middle of the camera's band in m."""
+        return (self.band.lower + self.band.upper) / 2 if self.band else None
 
     @property
     def usable(self) -> NDArray[np.bool_]:
@@ -167,10 +196,11 @@ def _mean_image(
     part = region or np.s_[:, :]
     found = np.bitwise_or.reduce(flags, axis=0)[part]
     radiance = np.asarray(frames.mean(axis=0)[part], np.float64)
-    if min(radiance.shape) < 8:
+    if min(radiance.shape) < _SMALLEST_SIDE:
         raise ValueError(
             f"{name}: the region has {radiance.shape[0]} x {radiance.shape[1]} pixels, expected "
-            f"8 x 8 or more of the image's {raster.rows} x {raster.columns}"
+            f"{_SMALLEST_SIDE} x {_SMALLEST_SIDE} or more of the image's {raster.rows} x "
+            f"{raster.columns}"
         )
     return EdgeImage(
         radiance,
@@ -180,7 +210,7 @@ def _mean_image(
         (found & Flag.SATURATED) != 0,
         (found & Flag.UNDER_RANGE) != 0,
         raster.spacing * sqrt(fill_factor or 1.0),
-        (band.lower + band.upper) / 2 if band else None,
+        band,
         name,
         notes=notes if fill_factor else notes + Notes([_WHOLE_SQUARE]),
     )
@@ -222,8 +252,8 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
 
 def _pixels_of(image: EdgeImage, line: EdgeLine) -> EdgePixels:
     x, y, radiance = (values[image.usable] for values in (*image.places, image.radiance))
-    if radiance.size < 40:
-        raise NoEdgeError(f"{radiance.size} usable pixels, expected 40 or more")
+    if radiance.size < _FEWEST_PIXELS:
+        raise NoEdgeError(f"{radiance.size} usable pixels, expected {_FEWEST_PIXELS} or more")
     sigma = np.full(radiance.size, max(float(radiance.std()), 1e-300))
     return EdgePixels(x, y, radiance, sigma, image.pitch, image.footprint, line)
 
@@ -256,7 +286,8 @@ def _piled_up(image: EdgeImage) -> NDArray[np.bool_]:
     values, counts = np.unique(image.radiance[image.usable], return_counts=True)
     if values.size < 3:
         return np.zeros_like(image.dead)
-    piled = counts[-1] >= _LEAST_PILE and counts[-1] > 3 * counts[-2] and counts[-1] > 3 * counts[0]
+    others = _PILE_RATIO * max(counts[-2], counts[0])
+    piled = counts[-1] >= _LEAST_PILE and counts[-1] > others
     return np.asarray((image.radiance == values[-1]) & piled)
 
 
@@ -297,8 +328,8 @@ def _clipped_text(clipped: NDArray[np.bool_], how: str, side: str, limit: float)
 
 
 def _chosen(pixels: EdgePixels, kept: NDArray[np.bool_]) -> EdgePixels:
-    if kept.sum() < 40:
-        raise NoEdgeError(f"{kept.sum()} pixels are not clipped, expected 40 or more")
+    if kept.sum() < _FEWEST_PIXELS:
+        raise NoEdgeError(f"{kept.sum()} pixels are not clipped, expected {_FEWEST_PIXELS} or more")
     each = {name: getattr(pixels, name)[kept] for name in ("x", "y", "radiance", "sigma")}
     return replace(pixels, **each)
 
@@ -307,10 +338,9 @@ def _without_outliers(pixels: EdgePixels, quick: ModelFit) -> tuple[EdgePixels, 
     """Return the pixels without those that lie far from all others as near to the edge."""
     left = pixels.radiance - quick.predicted(0, pixels)
     spread = MAD_FACTOR * float(np.median(np.abs(left - np.median(left))))
-    kept = np.abs(left) <= max(_OUTLIER * spread, 0.2 * quick.edges[0].step)
+    kept = np.abs(left) <= max(_OUTLIER * spread, _LEAST_OUTLIER * quick.edges[0].step)
     lost = int(np.count_nonzero(~kept))
-    # More than a few are not dead pixels but an object that is not an edge.
-    if lost == 0 or lost > 0.01 * kept.size:
+    if lost == 0 or lost > _MOST_OUTLIERS * kept.size:
         return pixels, []
     text = f"{lost} pixels far from the others are left out; if they are dead, flag them."
     return _chosen(pixels, kept), [text]
@@ -328,7 +358,7 @@ def _check_single(pixels: EdgePixels, quick: ModelFit) -> None:
     fraction = np.abs(np.where(weight > 0.5, mean, 0.0)) / quick.edges[0].step
     change = np.diff(total, axis=1)[(count[:, 1:] * count[:, :-1]) > 0]
     noise = float(np.median(np.abs(change))) / (_BLOCK_SIDE * quick.edges[0].step)
-    if fraction.max() > max(_SECOND_EDGE, 7 * noise):
+    if fraction.max() > max(_SECOND_EDGE, _CLEAR_BLOCK * noise):
         where = np.unravel_index(int(np.argmax(fraction)), fraction.shape)
         raise NoEdgeError(
             f"more than one straight edge: near row {where[0]}, column {where[1]} the image is "
@@ -340,7 +370,7 @@ def _check_single(pixels: EdgePixels, quick: ModelFit) -> None:
 def _bent(bend: tuple[float, float] | None, image: EdgeImage) -> Iterator[str]:
     if bend is None:
         yield "The edge was found by its step only; its straightness could not be checked."
-    elif bend[0] >= max(4 * bend[1], 0.05 * image.pitch):
+    elif bend[0] >= max(_CLEAR_BEND * bend[1], _LEAST_BEND * image.pitch):
         yield (
             f"The edge is bent by {bend[0] * 1e6:.2g} um over its length (standard uncertainty "
             f"{bend[1] * 1e6:.1g} um), which makes the point spread function too wide."

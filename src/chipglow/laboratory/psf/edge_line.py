@@ -19,6 +19,12 @@ _LEAST_PIXELS: Final = 10
 _WINDOW_PIXELS: Final = 6
 """Distance in pixels from the line at which the window of the derivative (Hamming's) ends."""
 
+_FEWEST_ROWS: Final = 8
+"""Fewest rows of which the centroids determine a line."""
+
+_WEAK_ROW: Final = 0.3
+"""Step of a row, by the median one, below which its centroid is not used."""
+
 _ITERATIONS: Final = 4
 """Iterations of a line and its window, and of a line and its outliers."""
 
@@ -61,6 +67,7 @@ def find_edge(image: Array, x: Array, y: Array) -> tuple[EdgeLine, tuple[float, 
     if np.ptp(pixels[2]) == 0.0:
         raise NoEdgeError("all pixels have the same radiance, expected an edge")
     pitch = float(x[1] - x[0])
+    # In degrees: all directions in steps of 1, then those around the best in steps of 0.1.
     _, coarse, _ = _best_step(*pixels, pitch, np.arange(0.0, 180.0, 1.0))
     around = degrees(coarse) + np.arange(-1.0, 1.05, 0.1)
     significance, normal, position = _best_step(*pixels, pitch / 2, around)
@@ -115,7 +122,7 @@ def _refined(
         expected = (line.position - there * other) / here
         place, centre = _centroids(derivative, middles, other, expected, pitch)
         kept = _without_outliers(place, centre)
-        if kept.sum() < 8:
+        if kept.sum() < _FEWEST_ROWS:
             return line, None
         slope, start = np.polyfit(place[kept], centre[kept], 1)
         line = _line_of(float(slope), float(start), steep, line)
@@ -130,14 +137,14 @@ def _centroids(
 ) -> tuple[Array, Array]:
     """Return the centroids of the derivative near the line, of rows that show all of it."""
     off = (middles[None, :] - expected[:, None]) / (_WINDOW_PIXELS * pitch)
-    window = np.where(np.abs(off) <= 1, 0.54 + 0.46 * np.cos(pi * off), 0.0)
+    window = np.where(np.abs(off) <= 1, 0.54 + 0.46 * np.cos(pi * off), 0.0)  # Hamming's
     known = np.isfinite(derivative) | (window == 0.0)
     whole = known.all(axis=1) & (
         np.abs(expected - middles.mean()) < np.ptp(middles) / 2 - 3 * pitch
     )
     weight = window * np.where(np.isfinite(derivative), derivative, 0.0)
     mass = weight.sum(axis=1)
-    strong = whole & (mass / np.median(mass[whole]) > 0.3) if whole.any() else whole
+    strong = whole & (mass / np.median(mass[whole]) > _WEAK_ROW) if whole.any() else whole
     return other[strong], (weight[strong] @ middles) / mass[strong]
 
 
@@ -145,11 +152,11 @@ def _without_outliers(place: Array, centre: Array) -> NDArray[np.bool_]:
     """Return which centroids lie near their line, by the median of their distances."""
     kept = np.ones(place.size, dtype=np.bool_)
     for _ in range(_ITERATIONS):
-        if kept.sum() < 8:
+        if kept.sum() < _FEWEST_ROWS:
             break
         residual = centre - np.polyval(np.polyfit(place[kept], centre[kept], 1), place)
         spread = MAD_FACTOR * float(np.median(np.abs(residual[kept])))
-        kept = np.abs(residual) <= max(_OUTLIER * spread, 1e-12)
+        kept = np.abs(residual) <= max(_OUTLIER * spread, 1e-12)  # in m: rounding
     return kept
 
 

@@ -13,11 +13,14 @@ BINS_PER_PITCH: Final = 4
 """Bins for each pixel pitch of an edge-spread function, as in ISO 12233."""
 
 _WINDOW_PITCHES: Final = 10.0
-"""Distance from the edge in pixel pitches within which the line-spread function is transformed, at
-least."""
+"""Smallest distance from the edge, in pixel pitches, up to which the line-spread function is
+transformed."""
 
 _WINDOW_WIDTHS: Final = 5.0
 """The same distance in widths of the line-spread function."""
+
+_KNOWN_SCATTER: Final = 10
+"""Fewest pixels of a bin whose own scatter is its noise."""
 
 _FREQUENCIES: Final = 65
 """Spatial frequencies of an MTF, from 0 to one over the pitch."""
@@ -45,7 +48,7 @@ def edge_curves(fit: ModelFit, index: int, pixels: EdgePixels) -> xr.Dataset:
     value = mean((pixels.radiance - edge.background) / edge.step)
     scatter = np.maximum(mean(departure**2) - residual**2, 0.0) * number / np.maximum(number - 1, 1)
     noise = mean((pixels.sigma / edge.step) ** 2)
-    variance = np.where(number >= 10, np.maximum(scatter, noise), noise)
+    variance = np.where(number >= _KNOWN_SCATTER, np.maximum(scatter, noise), noise)
     uncertainty, apart = np.sqrt(variance / number), np.diff(distance)
     columns: dict[str, tuple[str, Any, str]] = {
         "distance": ("bin", distance, "m"),

@@ -25,6 +25,9 @@ _EDGE_HEIGHT: Final = 5.6
 _APERTURES_HEIGHT: Final = 2.6
 """Height in inches of the panel of apertures."""
 
+_CURVE_POINTS: Final = 801
+"""Points of a fitted curve."""
+
 _SHOWN_WIDTHS: Final = 5.0
 """Distance from the edge that is shown, in widths of the line-spread function."""
 
@@ -51,7 +54,7 @@ def _draw_edge(figure: Any, found: "KnifeEdge", k: int, edge: "EdgeResult") -> N
     residual = figure.add_subplot(grid[1, 1], sharex=spread)
     response = found.best.response(k, edge.pixels)
     shown = min(_SHOWN_WIDTHS * edge.line_fwhm, edge.pixels.reach)
-    fine = np.linspace(-shown, shown, 801)
+    fine = np.linspace(-shown, shown, _CURVE_POINTS)
     _draw_spread(spread, residual, edge, fine, response(fine))
     _draw_line(figure.add_subplot(grid[2, 0]), edge, fine, response.slope(fine))
     _draw_transfer(figure.add_subplot(grid[2, 1]), edge)
@@ -109,12 +112,12 @@ def _draw_transfer(axes: Axes, edge: "EdgeResult") -> None:
         for name in ("frequency", "mtf", "mtf_uncertainty", "mtf_model", "mtf_optics")
     )
     frequency = frequency * 1e-3
-    drawing.shade(axes, frequency, mtf, 2 * spread, GREY, 0.3)
+    drawing.shade(axes, frequency, mtf, 2 * spread, GREY, opacity=0.3)
     axes.plot(frequency, mtf, color=GREY, label="measured, 2 u")
     axes.plot(frequency, model, color=VERMILLION, label="fit: optics and pixel")
     axes.plot(frequency, optics, color=BLUE, linestyle="--", label="fit: optics alone")
     axes.axvline(0.5e-3 / edge.image.pitch, color=VOID, linewidth=1.2, label="Nyquist", zorder=0)
-    axes.set_ylim(-0.05, 1.05)
+    axes.set_ylim(-0.05, 1.05)  # from 0 to 1, with a margin
     axes.set(title="modulation transfer function", xlabel="frequency / (1/mm)")
     # The curves go from one corner to the other: beside them there is no place for it.
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)

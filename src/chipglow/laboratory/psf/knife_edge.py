@@ -43,6 +43,7 @@ from chipglow.laboratory.psf.psf_models import (
 )
 from chipglow.laboratory.psf.size_of_source import ApertureImage, aperture_signals
 from chipglow.quantities import Array, Brief
+from chipglow.radiometry import Band
 from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Cause, Component
 from chipglow.uncertainty.estimate import factor
@@ -141,6 +142,7 @@ class KnifeEdge:
         """Probability of each model by the Bayesian criterion; all are equal if none fits."""
         if self.unexplained:
             return (1 / len(self.fits),) * len(self.fits)
+        # exp(−350) is small enough for 0, and does not underflow.
         likely = [exp(-min(fit.bic - self.best.bic, 700.0) / 2) for fit in self.fits]
         return tuple(value / sum(likely) for value in likely)
 
@@ -153,6 +155,12 @@ class KnifeEdge:
     def fwhm_uncertainty(self) -> float:
         """Its standard uncertainty in m."""
         return hypot(self.edge_uncertainty, self.oval * self.fwhm)
+
+    @property
+    def band(self) -> Band | None:
+        """Band of the images; None if they state none or several."""
+        first, *others = (edge.image.band for edge in self.edges)
+        return first if all(band == first for band in others) else None
 
     @property
     def edge_uncertainty(self) -> float:
@@ -337,6 +345,7 @@ def _edge_warnings(best: ModelFit, k: int, result: EdgeResult) -> Iterator[str]:
     distance = best.edges[k].line.distance(pixels.x, pixels.y)
     core = np.sort(distance[np.abs(distance) < max(best.fwhm, 2 * pixels.pitch)])
     gap = float(np.diff(core).max()) if core.size > 1 else pixels.pitch
+    # 5 % beyond a bin leave the aliasing limit as it is.
     if gap > 1.05 * pixels.pitch / BINS_PER_PITCH:
         yield (
             f"{name}: With a tilt of {degrees(best.edges[k].line.tilt):.2f} deg the pixels lie at "
@@ -437,7 +446,7 @@ def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
     if knife.oval:
         parts[OVAL] = [(kernel(psf, 1 + knife.oval) - kernel(psf, 1 - knife.oval)) / 2]
     components = [_component(name, effects) for name, effects in parts.items() if effects]
-    return MeasuredPSF(middle, spacing, tuple(components))
+    return MeasuredPSF(middle, spacing, tuple(components), band=knife.band)
 
 
 def _within(psf: PointSpreadFunction, reach: float) -> tuple[PointSpreadFunction, float]:

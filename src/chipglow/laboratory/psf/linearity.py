@@ -74,8 +74,8 @@ def asymmetry(
     with E(u) + E(−u) = 1. Values that are curved over the radiance are, to second order,
     E + q 4 E (1 − E): the same change on both sides of the edge. A wrong model or width makes
     opposite changes, which leave q as it is on a range that is symmetric about the edge. A shift of
-    the edge resembles q, so both are fitted, with background, step and width. What is left of q is
-    a lower limit: curved values also look like a shifted edge.
+    the edge resembles q, so both are fitted, with background, step and width. The fitted q is a
+    lower limit: curved values also look like a shifted edge.
     """
     distance = curves["distance"].values
     reach = min(-float(distance.min()), float(distance.max()), _REACH * width)

@@ -27,7 +27,7 @@ from chipglow.laboratory.psf.psf_models import (
 from chipglow.quantities import Array, Brief
 
 _LEAST_TURN: Final = pi / 18
-"""Smallest angle in rad between edges that count as of different orientation."""
+"""Smallest angle in rad between edges of different orientation."""
 
 _START_WIDTHS: Final = (0.5, 1.0, 1.7, 3.0, 5.0, 9.0)
 """Widths from which the fits start, in pixel pitches."""
@@ -80,6 +80,7 @@ class ApertureSignals(Brief):
     @cached_property
     def frequency(self) -> Array:
         """Frequencies in 1/m on which the transfer function is asked for."""
+        # Up to the third zero of a pixel, in 32 steps per period of the largest aperture.
         return np.arange(0.0, 3 / self.footprint, 1 / (16 * float(self.diameters.max())))
 
     @cached_property
@@ -204,7 +205,7 @@ class _Problem:
         low, high = self.low / self.scales, self.high / self.scales
         result = least_squares(
             lambda v: self.residual(v * self.scales),
-            np.clip(vector / self.scales, low + 1e-9, high - 1e-9),
+            np.clip(vector / self.scales, low + 1e-9, high - 1e-9),  # a start within the bounds
             jac=lambda v: self.jacobian(v * self.scales) * self.scales,
             bounds=(low, high),
             x_scale="jac",
@@ -368,6 +369,7 @@ def with_noise(edge: EdgePixels, predicted: Array) -> EdgePixels:
     if len(means) == 2:
         slope = (means[1][1] - means[0][1]) / max(means[1][0] - means[0][0], 1e-3)
     variance = means[0][1] + slope * (fraction - means[0][0])
+    # Each pixel has some noise: 2 % of the mean variance, or the rounding of 32-bit numbers.
     least = max(0.02 * float(square.mean()), (1e-7 * span) ** 2, 1e-300)
     return replace(edge, sigma=np.sqrt(np.maximum(variance, least)))
 

@@ -45,6 +45,15 @@ _MOFFAT_NODES: Final = np.geomspace(1e-7, 60.0, 1000)
 _MOST_WIDTHS: Final = 60.0
 """Largest reach of a Moffat function in its widths."""
 
+_SAMPLES_PER_WIDTH: Final = 8
+"""Samples of a kernel over its full width at half maximum, or over the radius of a disc."""
+
+_MOST_OBSCURED: Final = 0.81
+"""Largest obscured area, by that of the aperture: 0.9 of its diameter."""
+
+_DIRECTIONS: Final = 12
+"""Directions within 90 degrees over which the transfer function of a pixel is averaged."""
+
 _RADII: Final = 201
 """Radii among which the largest density is looked for."""
 
@@ -175,7 +184,7 @@ class GaussianTailModel(PSFModel):
         # The fraction (1 + r / length) exp(−r / length) of the tail is beyond r.
         while fraction * (1 + reach / length) * exp(-reach / length) > 1 - _TAIL_ENERGY:
             reach += 0.5 * length
-        return reach, core / 8
+        return reach, core / _SAMPLES_PER_WIDTH
 
 
 @dataclass(frozen=True)
@@ -188,11 +197,14 @@ class AnnularModel(PSFModel):
     parameters = ("numerical_aperture", "obscured_area")
 
     def starts(self, fwhm: float) -> list[list[float]]:
+        # Diffraction is about 0.49 wavelengths over the numerical aperture wide.
         aperture = min(0.9, 0.49 * self.wavelength / fwhm)
+        # Small, middle and large obscured areas.
         return [[aperture, area] for area in (0.02, 0.12, 0.35)]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        return [max(1e-4, 0.4 * self.wavelength / extent), 0.0], [1.0, 0.81]
+        # With a smaller aperture, diffraction is wider than the image.
+        return [max(1e-4, 0.4 * self.wavelength / extent), 0.0], [1.0, _MOST_OBSCURED]
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         relative = frequency * self.wavelength / (2 * values[0])
@@ -202,7 +214,7 @@ class AnnularModel(PSFModel):
         return self.psf(values).fwhm
 
     def psf(self, values: Array) -> PointSpreadFunction:
-        aperture, area = min(float(values[0]), 1.0), float(np.clip(values[1], 0.0, 0.81))
+        aperture, area = min(float(values[0]), 1.0), float(np.clip(values[1], 0.0, _MOST_OBSCURED))
         return AnnularAperturePSF(self.wavelength, aperture, sqrt(area))
 
 
@@ -234,7 +246,7 @@ class MoffatModel(PSFModel):
         fwhm, exponent = values.tolist()
         # (1 + (r / a)²)^(1 − exponent) of the light is beyond r.
         reach = self._radius(values) * sqrt((1 - _TAIL_ENERGY) ** (1 / (1 - exponent)) - 1)
-        return max(min(reach, _MOST_WIDTHS * fwhm), 2 * fwhm), fwhm / 8
+        return max(min(reach, _MOST_WIDTHS * fwhm), 2 * fwhm), fwhm / _SAMPLES_PER_WIDTH
 
     def fwhm(self, values: Array) -> float:
         return float(values[0])
@@ -270,7 +282,9 @@ class DefocusedDiscModel(PSFModel):
 
     def sampling(self, values: Array) -> tuple[float, float]:
         radius, sigma = float(values[0]) / 2, float(values[1]) / FWHM_PER_SIGMA
-        return radius + 5 * sigma, max(min(radius / 8, sigma), radius / 40)
+        # A Gaussian has exp(−5²/2) = 4e-6 of its light beyond 5 standard deviations. At most 40
+        # samples over a radius keep the kernel of a hardly blurred disc small.
+        return radius + 5 * sigma, max(min(radius / _SAMPLES_PER_WIDTH, sigma), radius / 40)
 
 
 @dataclass(frozen=True)
@@ -339,7 +353,7 @@ class EllipticalModel(PSFModel):
 
     def sampling(self, values: Array) -> tuple[float, float]:
         least, largest = np.sqrt(np.linalg.eigvalsh(self._squares(values))).tolist()
-        return 2.0 * largest, least / 8
+        return 2.0 * largest, least / _SAMPLES_PER_WIDTH
 
     def _squares(self, values: Array) -> Array:
         both = values[2] * values[0] * values[1] if self.tilted else 0.0
@@ -403,8 +417,8 @@ def disc_response(frequency: Array, diameter: float, radii: Array, footprint: fl
     """Return weights by which a transfer function gives the signal in the middle of a disc."""
     radius = diameter / 2
     square = np.zeros_like(frequency)
-    for angle in ((np.arange(12) + 0.5) * pi / 24).tolist():
-        square += footprint_transfer(frequency, angle, footprint) / 12
+    for angle in ((np.arange(_DIRECTIONS) + 0.5) * pi / (2 * _DIRECTIONS)).tolist():
+        square += footprint_transfer(frequency, angle, footprint) / _DIRECTIONS
     middle = np.mean([j0(2 * pi * frequency * rho) for rho in radii.tolist()], axis=0)
     weight = 2 * pi * radius * j1(2 * pi * frequency * radius) * middle * square
     step = float(frequency[1])

@@ -65,6 +65,7 @@ def _middle(image: ApertureImage) -> tuple[float, float, Array, float]:
     if not known.any():
         raise ValueError(f"{image.name}: no usable pixel, expected an aperture")
     pitch = float(image.x[1] - image.x[0])
+    # The 10th percentile is dark: the image shows the surroundings of the aperture.
     low, high = np.percentile(image.radiance[known], 10), image.radiance[known].max()
     bright = known & (image.radiance > (low + high) / 2)
     x, y = np.meshgrid(image.x, image.y)
@@ -76,6 +77,7 @@ def _middle(image: ApertureImage) -> tuple[float, float, Array, float]:
     radius = image.diameter / 2
     room = min(np.abs(across - image.x[[0, -1]]).min(), np.abs(up - image.y[[0, -1]]).min())
     seen = pitch * (np.count_nonzero(bright) / np.pi) ** 0.5
+    # Blur and the coarse grid of pixels change the bright area, but by less than this.
     if not 0.6 * radius - pitch < seen < 1.5 * radius + 3 * pitch or room < radius:
         raise ValueError(
             f"{image.name}: no aperture of {image.diameter * 1e6:.4g} um within the image; what is "
@@ -88,6 +90,7 @@ def _middle(image: ApertureImage) -> tuple[float, float, Array, float]:
     sigma = _noise(image.radiance, beside) / int(inner.sum()) ** 0.5
     outside = float(np.median(image.radiance[beside])) if beside.any() else float(low)
     signal = float(image.radiance[inner].mean())
+    # Without noise, the rounding of 32-bit numbers is left.
     return signal, max(sigma, 1e-7 * float(high - low)), away[inner], outside
 
 

@@ -237,6 +237,7 @@ def _problems(uniform: Recording, recording: Recording) -> Iterator[str]:
             "pixels may differ, write both files with the same axes and coordinates"
         )
     theirs, ours = uniform.integration_time, recording.integration_time
+    # Files round the times that they state.
     if theirs is not None and ours is not None and not np.isclose(theirs, ours, rtol=0.01):
         yield (
             f"has an integration time of {1e6 * theirs:g} us, the recording {1e6 * ours:g} us, "

@@ -26,6 +26,9 @@ _FLAGS: Final = {
 _IMAGE_HEIGHTS: Final = (2.0, 6.0)
 """Smallest and largest height of an image in inches."""
 
+_IMAGE_WIDTH: Final = 5.6
+"""Width of an image in inches."""
+
 _HISTOGRAM_HEIGHT: Final = 2.2
 """Height of the histogram in inches."""
 
@@ -43,7 +46,7 @@ def draw_measurement(measurement: Measurement, time: float | None = None) -> Fig
     index = shown_frame(measurement.times, time, "measurement")
     celsius = measurement.radiance_temperature()[index] - ZERO_CELSIUS
     flags, raster = measurement.flags[index], measurement.raster
-    height = float(np.clip(5.6 * raster.rows / raster.columns, *_IMAGE_HEIGHTS))
+    height = float(np.clip(_IMAGE_WIDTH * raster.rows / raster.columns, *_IMAGE_HEIGHTS))
     with drawing.style():
         figure = drawing.new_figure(height + _HISTOGRAM_HEIGHT + 0.9)
         upper, lower = figure.subplots(2, 1, height_ratios=(height, _HISTOGRAM_HEIGHT))

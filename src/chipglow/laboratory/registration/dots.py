@@ -28,10 +28,10 @@ _LARGEST_SCALE: Final = 1 / 12
 it across."""
 
 _SCALE_RATIO: Final = 1.25
-"""Ratio of successive standard deviations, less than the ratio of sizes that count as alike."""
+"""Ratio of successive standard deviations, below the ratio of sizes that count as equal."""
 
 _MAX_EXTREMA: Final = 600
-"""Number of the strongest extrema that are examined; limits the time for noisy images."""
+"""Maximum number of extrema examined, strongest first; limits the time for noisy images."""
 
 _MIN_ROUNDNESS: Final = 0.7
 """Smallest roundness of a dot: 1 for a circle, 0 for an edge; 0.7 where the curvatures are 1 to
@@ -339,10 +339,10 @@ def _disc(
     begin = [0.0, 0.0, 1.4 * size, 0.7 * size, contrast, ground, 0.0, 0.0]
     if own is not None:
         begin[2:5] = own.radius, own.softness, own.contrast / scale
-    # Brightness is in units of its range in the window, so a contrast of 20 is no disc.
+    # Brightness is in units of its range in the window: no disc has a contrast of 20.
     upper = [reach / 2, reach / 2, 2 * reach, 2 * reach, 20.0, np.inf, 1 / reach, 1 / reach]
     lower = [-b for b in upper]
-    lower[2] = lower[3] = 0.05 * size  # a radius and a softness over 0
+    lower[2] = lower[3] = 0.05 * size  # a positive radius and softness
     begin = np.clip(begin, lower, upper).tolist()
     fit = least_squares(residual, begin, bounds=(lower, upper), x_scale="jac", ftol=_FIT_TOLERANCE)
     variance = float(fit.fun @ fit.fun) / (target.size - len(begin))

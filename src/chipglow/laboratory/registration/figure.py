@@ -14,10 +14,14 @@ from chipglow.laboratory.registration.registration import Registration
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.scene import Raster, Tool
 from chipglow.scene.figures import show_image
+from chipglow.scene.tool import DRAWN_FACE
 
-_FACE: Final = 3e-3
 _OPACITY: Final = 0.55
+"""Opacity of the infrared image over the visible picture."""
+
 _BLINK_WIDTH: Final = 6.4
+"""Width in inches of the pictures that are shown in turn."""
+
 _LABEL: Final = "radiance temperature / °C"
 
 
@@ -87,6 +91,6 @@ def _draw_tool(
     axes: Axes, registration: Registration, tool: Tool | None, shape: tuple[int, ...]
 ) -> None:
     if tool is not None:
-        drawing.draw_line(axes, registration.pixels(tool.outline(_FACE)), "black", factor=1.0)
+        drawing.draw_line(axes, registration.pixels(tool.outline(DRAWN_FACE)), "black", factor=1.0)
     axes.set_xlim(-0.5, shape[1] - 0.5)
     axes.set_ylim(shape[0] - 0.5, -0.5)

@@ -149,6 +149,7 @@ def _brightness(page: Image.Image) -> NDArray[np.float32]:
 
 def write_blink(pictures: tuple[NDArray[np.uint8], ...], path: str | Path) -> None:
     """Write pictures that are shown in turns, again and again, as a GIF."""
+    # A GIF has up to 256 colours.
     first, *others = (Image.fromarray(picture).quantize(255) for picture in pictures)
     with atomic_path(path) as temporary:
         first.save(

@@ -282,6 +282,7 @@ def _least(
         return (_element_slopes(matrix_of(parameters), found) @ basis).reshape(-1, basis.shape[1])
 
     begin = _direct(found, target, basis)
+    # Few parameters: the fit ends at rounding errors.
     fit = least_squares(residual, begin, slope, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14)
     return basis, residual(fit.x), slope(fit.x), matrix_of(fit.x)
 

@@ -35,6 +35,9 @@ it is a warning."""
 _MOST_OFFSETS: Final = 2_000_000
 """Most offsets that are tried; limits memory and time."""
 
+_OFFSETS_PER_FRAME: Final = 3
+"""Offsets that are tried for each visible frame."""
+
 _VALUES_AT_ONCE: Final = 200_000
 """Values that are computed at once: 1.6 MB."""
 
@@ -120,6 +123,7 @@ def _check(name: str, times: Array, values: Array) -> None:
         raise ValueError(f"{name} signal: {times.size} frames, expected {_FEWEST_FRAMES} or more")
     if not (np.isfinite(values).all() and (np.diff(times) > 0).all()):
         raise ValueError(f"{name} signal: expected finite values at ascending times")
+    # A billionth of the mean is rounding.
     if not values.std() > 1e-9 * max(abs(values.mean()), 1e-300):
         raise ValueError(f"{name} signal: does not change, expected an event that is seen in it")
 
@@ -142,14 +146,15 @@ def _correlations(
     times: Array, target: Array, visible_times: Array, spline: CubicSpline
 ) -> tuple[Array, Array]:
     """Return offsets in s on a grid, and the correlation at each."""
-    step = float(np.median(np.diff(visible_times))) / 3
+    step = float(np.median(np.diff(visible_times))) / _OFFSETS_PER_FRAME
     low = visible_times[0] - np.quantile(times, 1 - _LEAST_OVERLAP)
     high = visible_times[-1] - np.quantile(times, _LEAST_OVERLAP)
     count = int((high - low) / step) + 1
     if not 1 <= count <= _MOST_OFFSETS:
         raise ValueError(
             "signals: the series do not overlap, or are too long, expected up to "
-            f"{_MOST_OFFSETS // 3} visible frames and half of the infrared ones among them"
+            f"{_MOST_OFFSETS // _OFFSETS_PER_FRAME} visible frames and half of the "
+            "infrared ones among them"
         )
     offsets = low + step * np.arange(count)
     parts = np.array_split(offsets, max(offsets.size * times.size // _VALUES_AT_ONCE, 1))

@@ -137,7 +137,7 @@ def _frames_per_file(array: FileArray) -> int:
 
 
 def _squeezed(array: FileArray) -> FileArray:
-    """Return an array of more than three axes without those of length 1, as of a single band."""
+    """Return an array of over three axes without axes of length 1, such as a single band."""
     if len(array.shape) <= 3:
         return array
     kept = [number for number, length in enumerate(array.shape) if length > 1]

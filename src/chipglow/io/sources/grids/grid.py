@@ -2,21 +2,14 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import isfinite
 from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.conventions import (
-    OTHER_NAMES,
-    Placement,
-    Units,
-    simple,
-    unit_in_name,
-    unit_of,
-)
+from chipglow.io.sources.conventions import OTHER_NAMES, NamedSource, simple, unit_in_name, unit_of
 from chipglow.io.sources.grids.arrays import ARRAY_READERS, open_arrays
 from chipglow.io.sources.grids.file_array import FileArray
 from chipglow.io.sources.grids.layout import (
@@ -39,7 +32,6 @@ from chipglow.io.sources.grids.layout import (
 )
 from chipglow.io.sources.plausible import check_sides, check_tenths
 from chipglow.io.sources.source import (
-    Source,
     SourceError,
     Survey,
     check_times,
@@ -59,7 +51,7 @@ _LARGEST_BLOCK: Final = 64_000_000
 
 
 @dataclass(frozen=True)
-class GridSource(ArrayNumbers, Source):
+class GridSource(ArrayNumbers, NamedSource):
     """Fields on a regular grid over time.
 
     ``names`` maps names in a scene to names in the file; also of ``material``
@@ -77,7 +69,6 @@ class GridSource(ArrayNumbers, Source):
             allowed="none, or {temperature: T.npy, plastic_strain: strain.npy}",
         ),
     ] = None
-    names: Mapping[str, str] = field(default_factory=dict)
     top_first: Annotated[
         bool, Parameter("Whether row 0 is the top one, without a coordinate y.")
     ] = True
@@ -91,9 +82,6 @@ class GridSource(ArrayNumbers, Source):
     ] = None
     left: Annotated[float, Parameter("Left edge of the grid, with spacing.", POSITION)] = 0.0
     top: Annotated[float, Parameter("Upper edge of the grid, with spacing.", POSITION)] = 0.0
-    interval: float | None = None
-    units: Units = field(default_factory=Units)
-    placement: Placement = field(default_factory=Placement)
 
     def __post_init__(self) -> None:
         super().__post_init__()

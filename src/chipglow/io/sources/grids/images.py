@@ -58,16 +58,30 @@ def _turn(orientation: object, notes: Notes) -> int:
 _BLACK_IS_ZERO: Final = ("MINISBLACK", "LINEAR_RAW")
 _MOST_BITS_OF_COLOURS: Final = 8
 """Planes of more bits are usually a stack of frames, which tifffile writes so by default."""
+
 _GDAL: Final = 42112
+"""TIFF tag of GDAL's metadata."""
+
 _NO_DATA: Final = 42113
+"""TIFF tag of GDAL's missing value."""
+
 _GDAL_ROLES: Final = {"scale": "scale_factor", "offset": "add_offset", "unittype": "units"}
 """Attributes of NetCDF by the roles of items of GDAL's metadata."""
+
 _X_RESOLUTION: Final = 282
+"""TIFF tag XResolution."""
+
 _PHOTOMETRIC: Final = 262
+"""TIFF tag PhotometricInterpretation."""
+
 _INCH_AND_CENTIMETRE: Final = {2: 0.0254, 3: 0.01}
+"""Units in m by the value of the TIFF tag ResolutionUnit."""
+
 _POLYNOMIALS: Final = (0, 1, 2, 3)
 """ImageJ's calibration functions that are polynomials, of degree 1 to 4."""
+
 _NO_FUNCTION: Final = 20
+"""ImageJ's code of an image without a calibration function."""
 
 
 def tiff_arrays(path: Path, stack: ExitStack) -> Iterator[FileArray]:
@@ -367,12 +381,16 @@ def _decoded(path: Path, page: Any) -> NDArray[Any]:
 
 
 _PNG_HEADER: Final = 26
+"""Bytes of a PNG file up to bit depth and colour type."""
+
 _PNG_COLOURS: Final = {
     2: "its pixels have colours",
     3: "its numbers are indices of a palette of colours",
     4: "its pixels have a transparency",
     6: "its pixels have colours and a transparency",
 }
+"""Colour types of PNG that are refused, with the reason."""
+
 _SWAPPED: Final = 0.25
 """Ratio of differences of neighbours, with bytes swapped and as read, of a file written swapped."""
 

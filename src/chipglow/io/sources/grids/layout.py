@@ -136,7 +136,7 @@ def _as_list(array: FileArray) -> FileArray:
     line = mesh[0]
     if not (mesh == line).all():
         if is_in_each_frame:
-            raise SourceError(f"{array}: differs between frames, expected the same {axis} in all")
+            raise SourceError(f"{array}: differs between frames; {axis} must be the same in all")
         return array
     stated = {name: value for name, value in array.attributes.items() if name not in PACKING}
     return replace(array, shape=line.shape, read=lambda key: line[key], dims=(), chunks=None,

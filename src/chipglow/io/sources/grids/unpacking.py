@@ -1,4 +1,4 @@
-"""Numbers of a file that are packed, missing or invalid by the conventions of NetCDF."""
+"""Packed, missing and invalid numbers of a file by the conventions of NetCDF."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -13,7 +13,7 @@ PACKING: Final = (
 """Attributes that `unpack` applies."""
 
 _PREFILLED: Final[Mapping[str, float]] = {"i2": -32767, "i4": -2147483647, "i8": -(2**63) + 2}
-"""What the NetCDF library writes before a number is written, by type.
+"""Values with which the NetCDF library fills arrays before writing, by type.
 
 Bytes have no such value, and that of unsigned types, the largest one, may be a saturated count.
 """

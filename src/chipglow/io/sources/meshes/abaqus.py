@@ -33,7 +33,10 @@ _WITHOUT_AREA: Final = re.compile(
 """Rigid lines, points, springs, dashpots, connectors, trusses and beams."""
 
 _VTK_FLAT: Final[Mapping[int, int]] = {3: 5, 4: 9, 6: 22, 8: 23}
+"""VTK's cell types of flat elements, by their number of nodes."""
+
 _VTK_SOLID: Final[Mapping[int, int]] = {4: 10, 5: 14, 6: 13, 8: 12, 10: 24, 15: 26, 20: 25}
+"""VTK's cell types of solid elements, by their number of nodes."""
 
 _PARTS: Final = ("PART", "END PART", "ASSEMBLY", "END ASSEMBLY", "INSTANCE", "END INSTANCE")
 _NOT_READ: Final = (
@@ -49,7 +52,7 @@ _DIRECTIONS: Final = 3
 _POSITIONS: Final = tuple(f"{name}{axis}" for name in ("COOR", "U") for axis in (1, 2, 3))
 """Columns of tables of nodes that state where the nodes are."""
 
-_UNMOVED: Final = "Positions are those of the input file: its tables have no U1 and no COOR1."
+_UNMOVED: Final = "Positions are taken from the input file: its tables have no U1 and no COOR1."
 
 
 class _Row(NamedTuple):
@@ -143,8 +146,8 @@ def _read_deck(file: Path) -> tuple[_Deck, Counter[str]]:
     with_area = [name for name, deck in decks.items() if deck.elements]
     if len(with_area) > 1:
         raise SourceError(
-            f"{file}: {', '.join(with_area)} have elements with an area, expected one part "
-            "with one instance at most, because tables state no instance"
+            f"{file}: {', '.join(with_area)} have elements with an area; only one part "
+            "with one instance can be read, because tables state no instance"
         )
     if not with_area:
         raise SourceError(
@@ -366,7 +369,7 @@ _STEPS: Final[Mapping[str, Callable[[_Deck, Mapping[str, str], Sequence[str]], N
     "ELGEN": _take_element_copies,
     "ELSET": _take_set,
 }
-"""What a line of data of a keyword adds to a mesh, in the order in which keywords are taken."""
+"""Functions that add a data line of a keyword to a mesh, in the order of processing."""
 
 
 def _set_of(deck: _Deck, options: Mapping[str, str]) -> set[int]:

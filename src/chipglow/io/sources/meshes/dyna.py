@@ -12,7 +12,9 @@ from chipglow.io.sources.meshes.reader import Block, MeshReader, grid_of
 from chipglow.io.sources.source import SourceError, reading, required
 
 _KIND: Final = "LS-DYNA d3plot"
+
 _TRIANGLE, _QUAD, _TETRA, _HEXA = 5, 9, 10, 12
+"""VTK's cell types."""
 
 
 class DynaReader(MeshReader):

@@ -15,6 +15,8 @@ from chipglow.io.sources.source import SourceError
 Arrays: TypeAlias = Mapping[str, NDArray[np.float64]]
 
 _TRIANGLE, _PIXEL, _QUAD = 5, 8, 9
+"""VTK's cell types."""
+
 _OTHER_FLAT: Final = (6, 7, 22, 23, 28, 34, 35, 63, 69, 70, 76, 77)
 """Strips, polygons and curved elements, which VTK cuts into pieces of a quarter of their edges.
 
@@ -22,13 +24,16 @@ A field with second derivative f'' along an edge of length h is then off by up t
 """
 
 _LINES_AND_POINTS: Final = (0, 1, 2, 3, 4, 21, 36, 60, 61, 68, 75)
+"""VTK's cell types without an area."""
 
 _NUDGE: Final = 1e-7
 """Part of the mesh by which a cut in its outermost face is moved inwards."""
 
 _FLAT: Final = 1e-3  # depth of a mesh by its longest side, up to which it is flat
 _TOOL: Final = "chipglow: tool"
+
 _HIDDEN_GHOST: Final = 32
+"""VTK's bit of hidden cells, HIDDENCELL."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +139,7 @@ def _without_boundary(grids: Sequence[Any]) -> Iterator[Any]:
 def _keys(points: Any) -> NDArray[Any]:
     """Return positions as bytes, which can be compared as a whole."""
     rows = np.ascontiguousarray(np.asarray(points, np.float64) + 0.0)
-    return rows.view(np.dtype((np.void, 24))).ravel()
+    return rows.view(np.dtype((np.void, 24))).ravel()  # three float64
 
 
 def _with_only(grid: Any, wanted: Collection[str], is_tool: NDArray[np.bool_]) -> Any:

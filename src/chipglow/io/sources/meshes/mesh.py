@@ -1,7 +1,7 @@
 """Meshes over time, from the programs that compute them."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, ClassVar, Final, Literal
@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.conventions import (
     OTHER_NAMES,
-    Placement,
-    Units,
+    NamedSource,
     known_unit,
     match_names,
     simple,
@@ -27,7 +26,6 @@ from chipglow.io.sources.meshes.flat import FlatMesh, flatten
 from chipglow.io.sources.meshes.reader import Block, MeshReader, check_grid, fields_of
 from chipglow.io.sources.meshes.triangles import NOTHING, rasterise
 from chipglow.io.sources.source import (
-    Source,
     SourceError,
     Survey,
     even_times,
@@ -51,15 +49,19 @@ MESH_READERS: Final[Mapping[str, Callable[[Sequence[Path]], MeshReader]]] = {
 
 _VECTOR: Final = "velocity"
 _COMPONENTS: Final = ("velocity_x", "velocity_y")
+
 _VECTOR_SIZES: Final = (2, 3)
+"""Numbers of components of vectors."""
+
 _COMPOUND_SIZES: Final = (*_VECTOR_SIZES, 6, 9)
+"""Numbers of components of vectors, symmetric tensors and tensors."""
 
 _MOST_PARTS: Final = 1000
 """Most parts of a mesh."""
 
 
 @dataclass(frozen=True)
-class MeshSource(Source, Part):
+class MeshSource(NamedSource, Part):
     """Finite-element results: meshes with fields, one for each time.
 
     Elements are sampled exactly as they are: fields of nodes by the element's own shape, fields of
@@ -77,11 +79,7 @@ class MeshSource(Source, Part):
         "d3plot",
     )
     files: Path = Path()
-    names: Mapping[str, str] = field(default_factory=dict)
-    units: Units = field(default_factory=Units)
-    placement: Placement = field(default_factory=Placement)
     times: tuple[float, ...] = ()
-    interval: float | None = None
     section: Annotated[
         float | Literal["facing"] | None,
         Parameter(

@@ -49,7 +49,7 @@ class MeshReader(ABC):
     known: Mapping[str, str] = MappingProxyType({})
     """Names that fields have in this format alone, by the names of a scene."""
     remarks: list[str]
-    """What is left out, and what the files lack, as far as they have been read."""
+    """Remarks on data that are left out or missing in the files read so far."""
 
     def __init__(self, files: Sequence[Path], kind: str) -> None:
         for file in files:

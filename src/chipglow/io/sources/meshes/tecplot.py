@@ -102,7 +102,7 @@ def _ascii_zones(file: Path) -> tuple[Zone, ...]:
         if kind == b"VARIABLES":
             with naming(f"{file}: VARIABLES"):
                 if names:
-                    raise ValueError("there are several, expected one")
+                    raise ValueError("there are several; only one is allowed")
                 names = _names(_text(content[begin:end]))
         elif kind == b"ZONE":
             zones.append(_ascii_zone(file, content, 1 + len(zones), names, begin, end))

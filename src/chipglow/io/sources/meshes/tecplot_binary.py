@@ -30,23 +30,39 @@ ELEMENTS: Final[Mapping[str, tuple[int, int]]] = {
 MAGIC: Final = b"#!TDV"
 
 _VERSIONS: Final = (*range(107, 113), 191)
+"""Versions of the format that are read."""
+
 _ZONE, _GEOMETRY, _TEXT, _LABELS, _RECORD, _ABOUT_FILE, _ABOUT_VARIABLE, _END_OF_HEADER = (
     299.0, 399.0, 499.0, 599.0, 699.0, 799.0, 899.0, 357.0,
 )  # fmt: skip
+"""Markers of the parts of a header."""
+
 _KINDS: Final = (
     ORDERED, "LINESEG", "TRIANGLE", "QUADRILATERAL", "TETRAHEDRON", "BRICK", "POLYGON",
     "POLYHEDRON",
 )  # fmt: skip
+
 _FACES: Final = {"TRIANGLE": 3, "QUADRILATERAL": 4, "TETRAHEDRON": 4, "BRICK": 6}
+"""Number of faces of the elements."""
+
 _NUMBERS: Final = {1: "f4", 2: "f8", 3: "i4", 4: "i2", 5: "u1"}
+"""NumPy's types of the numbers of a variable, by their code."""
+
 _NEIGHBOURS: Final = {0: 3, 2: 4}
 """Count of numbers in a connection of faces, by its mode."""
+
 _LONGEST_TEXT: Final = 32_000
+"""Most letters of a text; a longer one is a damaged file."""
+
 _STATIC: Final = -1
 _ALONE: Final = -1
 _SOLUTION: Final = 2
+
 _LINE, _RECTANGLE, _ELLIPSE = 0, 1, 4
+"""Codes of geometries; lines list points, rectangles and ellipses have two sizes."""
+
 _GRID_3D: Final = 4
+"""Code of the coordinates of geometries whose points have three components."""
 
 
 class Zone(NamedTuple):
@@ -386,5 +402,5 @@ def _cells(cursor: _Cursor, zones: Sequence[_Zone], number: int, of: int) -> NDA
 def _before(zones: Sequence[_Zone], number: int, of: int) -> _Zone:
     """Return the zone whose numbers a zone shares."""
     if not 0 <= of < number - 1:
-        raise _damaged(f"zone {number} shares with zone {of + 1}, expected one before it")
+        raise _damaged(f"zone {number} shares with zone {of + 1}, which is not before it")
     return zones[of]

@@ -35,8 +35,13 @@ _AS: Final[Mapping[str, str]] = {
 }  # fmt: skip
 _INSIDES: Final = ("Element Blocks", "internalMesh", "Internal")
 """VTK's names for the elements of Exodus, OpenFOAM and CGNS, beside sets and boundaries."""
+
 _HEAD: Final = 100_000
+"""Bytes of a file in which its time is searched; VTK writes it before the arrays."""
+
 _MOST_XDMF: Final = 10_000_000
+"""Most bytes of an XDMF file that are searched: numbers may stand in it as text."""
+
 _TIME: Final = rb'Name="(?:TimeValue|TIME)"[^>]*RangeMin="([-+.eE\d]+)"'
 
 

@@ -20,15 +20,32 @@ Picture: TypeAlias = NDArray[np.uint8]
 """Red, green and blue of the pixels, row 0 at the top, shape (y, x, 3)."""
 
 _LEVELS: Final = 256
+"""Number of colours of a named map without bands, as many as 8 bits distinguish."""
+
 _SAME: Final = 7.0  # a difference in Lab that a codec makes between two pixels of one colour
+
 _APART: Final = 15.0
+"""Difference in Lab beyond which a scale has left a colour: twice what codecs change."""
+
+_COMPARED: Final = 192
+"""Most knots compared in pairs to find a repeated colour: limits time and memory."""
+
 _CHORD: Final = 0.01  # half of the fraction of the scale over which its slope is taken
+
 _FEWEST_BANDS, _MOST_BANDS = 2, 40
+"""Numbers of bands that are tried."""
+
 _NARROWEST_BAND: Final = 6
+"""Width in pixels of the narrowest band: `_BLURRED` pixels at both edges and a middle."""
+
 _BLURRED: Final = 2.0
+"""Pixels on either side of an edge between bands whose colours are mixed by codecs."""
+
 _BANDED: Final = 0.5
+"""Misfit of bands, by that of lines between them, below which a legend has bands."""
+
 _AS_WELL, _AS_WELL_LAB = 2.0, 0.5
-"""Of the numbers of bands, the smallest is taken that fits up to this much worse than the best one.
+"""Factor and addend in CIE L*a*b* by which the misfit of fewer bands may exceed the smallest.
 
 A box that is off by 2 pixels shifts the edges of the bands, to which multiples of their number fit
 slightly better.
@@ -75,7 +92,7 @@ class ColourScale:
 
     def __post_init__(self) -> None:
         """Refuse a scale that returns to a colour that it left."""
-        chosen = np.unique(np.linspace(0, len(self.knots) - 1, 192).astype(int))
+        chosen = np.unique(np.linspace(0, len(self.knots) - 1, _COMPARED).astype(int))
         labs = self.labs[chosen]
         apart = np.triu(np.linalg.norm(labs[:, None] - labs[None, :], axis=2))
         left = np.maximum.accumulate(apart, axis=1) > _APART
@@ -149,7 +166,7 @@ class ColourScale:
 
         Adjacent knots whose colours differ by no more than noise are not distinguished. The true
         value and the value that is read are then both anywhere in their range; in the range of a
-        single knot its middle is read.
+        single knot the centre is read.
         """
         first, last = self._runs
         below, above = (self._alike(side) for side in (-1, 1))
@@ -161,7 +178,7 @@ class ColourScale:
         return np.asarray(self.values[last] - self.values[first] + step)
 
     def _alike(self, side: int) -> NDArray[np.intp]:
-        """Return the farthest knot up to which colours are those of each knot, shape (m,)."""
+        """Return the farthest knot with the same colour as each knot and all between, (m,)."""
         count = len(self.labs)
         result = np.arange(count)
         growing = result.copy()
@@ -257,6 +274,7 @@ def colour_uncertainty(
     widths = np.interp(values, scale.knots, scale.widths)
     noise = distance * np.interp(values, scale.knots, scale.sensitivity)
     if scale.banded:
+        # 1e-9 of a width is negligible; it prevents a division by zero.
         wrong = erfc(widths / 2 / np.maximum(noise, 1e-9 * widths) / sqrt(2))
         noise = np.sqrt(wrong) * widths
     colours = np.interp(values, scale.knots, scale.uncertainties)
@@ -281,7 +299,7 @@ def _map_colours(name: str, count: int) -> NDArray[np.float64]:
     from matplotlib.colors import hsv_to_rgb
 
     if name == RAINBOW:
-        hue = np.linspace(2 / 3, 0.0, count)
+        hue = np.linspace(2 / 3, 0.0, count)  # from blue to red
         return np.asarray(hsv_to_rgb(np.stack([hue, np.ones(count), np.ones(count)], axis=1)))
     plain = name.removeprefix("matplotlib.")
     if plain not in colormaps:
@@ -325,7 +343,7 @@ def _misfits(labs: NDArray[np.float64], count: int) -> tuple[float, float]:
 
 
 def _inner(colours: NDArray[np.float64], first: float, last: float) -> NDArray[np.float64]:
-    """Return the middle of a band, at least a pixel."""
+    """Return the middle of a band, at least a pixel and the half of a narrow band."""
     trim = min(_BLURRED, (last - first) / 4)
     start = int(np.ceil(first + trim - 0.5))
     return colours[start : max(int(last - trim + 0.5), start + 1)]

@@ -17,9 +17,15 @@ from chipglow.io.sources.movies.overlays import (
 from chipglow.io.sources.source import SourceError
 
 _EDGE: Final = 8.0  # a difference in CIE L*a*b*
+
 _BLUR: Final = 3
+"""Pixels at an end of a legend whose colours are mixed with those outside by codecs."""
+
 _AROUND: Final = 6
+"""Pixels around a legend that are left out with it: outline, ticks and their blur."""
+
 _MOST_PIXELS: Final = 3000
+"""Pixels compared with a scale: enough for a fraction with a standard error of 1 %."""
 
 _REACH: Final = 5
 """Pixels before and behind an end that are examined: fewer than the narrowest band has."""
@@ -84,7 +90,7 @@ def _uncertainty(
 
 
 def _start_of_gradient(beyond: NDArray[np.float64], inside: NDArray[np.float64]) -> float:
-    """Return where colours leave that of the page, which is that of the legend's end.
+    """Return where colours depart from the page's colour, which equals the legend's end colour.
 
     NaN if they are not constant outside, or constant inside as well.
     """

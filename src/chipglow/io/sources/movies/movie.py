@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator
 
 from chipglow.io.nearest import fill
-from chipglow.io.sources.conventions import SI_UNITS, PlacedGrid, Placement
+from chipglow.io.sources.conventions import SI_UNITS, PlacedGrid, PlacedSource
 from chipglow.io.sources.movies.colour_scale import (
     ColourScale,
     ColourUncertainty,
@@ -41,7 +41,7 @@ from chipglow.io.sources.movies.overlays import (
     polygon_mask,
 )
 from chipglow.io.sources.movies.pictures import MovieIndex, index_movie, pictures
-from chipglow.io.sources.source import Source, SourceError, Survey, even_times, extent_of, naming
+from chipglow.io.sources.source import SourceError, Survey, even_times, extent_of, naming
 from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, parse_unit
 from chipglow.scene import FIELD_UNITS, FILLED, Material, Raster, SampledFrame
@@ -61,8 +61,11 @@ Pixel = tuple[float, float]
 _LEGEND_MARGIN: Final = 3
 """Pixels around a legend that are left out with it."""
 
+_LIKE_TOOL: Final = 16
+"""Difference from the tool's colour in 8 bits up to which a colour is the tool, not background."""
+
 _NOISE_OF_YUV: Final = 1.0
-"""Least noise in CIE L*a*b* of colours that are stored as 8 bits of luminance and chrominance.
+"""Smallest noise in CIE L*a*b* of colours stored as 8 bits of luminance and chrominance.
 
 It is the median error of ramps in `viridis` and `jet` as MJPEG and H.264 of good quality. Within a
 uniform area it is the same everywhere, and so cannot be seen there.
@@ -154,7 +157,7 @@ def _number(place: str, name: str, value: str | float) -> float:
 
 
 @dataclass(frozen=True)
-class MovieSource(Source, Part):
+class MovieSource(PlacedSource, Part):
     """Movies of fields with a colour scale, a movie a field.
 
     They have the same size and number of pictures. ``files`` is the movie of the temperature if
@@ -230,8 +233,6 @@ class MovieSource(Source, Part):
         None
     )
     files: str = ""
-    interval: float | None = None
-    placement: Placement = field(default_factory=Placement)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -411,7 +412,7 @@ class MovieSource(Source, Part):
         if self.tool_colour is not None:
             tool = np.array(self.tool_colour)
             found, values = (
-                tuple(colour for colour in colours if np.abs(tool - colour).max() > 16)
+                tuple(colour for colour in colours if np.abs(tool - colour).max() > _LIKE_TOOL)
                 for colours in (found, values)
             )
         # Pixels at the cold end of the scale may be background; hotter ones are not.

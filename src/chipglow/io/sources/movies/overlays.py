@@ -35,18 +35,34 @@ MARK_TOLERANCE: Final = 10.0
 """Tolerance of the colours of background and tool, in CIE L*a*b*."""
 
 _GREY: Final = 10.0
+"""Chroma in CIE L*a*b* below which a colour is grey."""
+
 _FEWEST_FILLED: Final = 0.01
+"""Fraction of filled pixels below which the error of filling is neglected."""
+
 _SHIFTS: Final = ((2, 3), (5, -4), (-3, 6))
+"""Displacements down and right, in pixels, at which lines are tried elsewhere."""
 
 _LUMA: Final = np.array([0.299, 0.587, 0.114])
 """Weights of red, green and blue in the brightness (ITU-R BT.601)."""
 
 _VALLEY: Final = 0.2
+"""Depth of a dark line as a fraction of the brightness around it."""
+
 _NOISE: Final = 8.0
+"""Smallest depth of a dark line in 8-bit brightness: more than the noise of codecs."""
+
 _ONE_COLOUR: Final = 3.0
+"""Root mean square distance in CIE L*a*b* up to which pixels have one colour."""
+
 _MESH_SHARE: Final = 0.03
+"""Fraction of dark pixels of a picture above which a mesh is drawn."""
+
 _BORDER_SHARE: Final = 0.1
+"""Smallest fraction of the border of a picture that a background covers."""
+
 _COARSE: Final = 16
+"""Width in 8-bit levels of the classes in which colours of the border are counted."""
 
 
 @dataclass(frozen=True)
@@ -167,6 +183,7 @@ def dark_lines(picture: Picture) -> NDArray[np.bool_]:
     The colours of black lines may be of the scale, and a codec mixes them with those beside them.
     """
     light = picture @ _LUMA
+    # A closing over 5 pixels fills lines up to 2 wide and their blur.
     around = grey_closing(light, 5)
     lines = around - light > np.maximum(_VALLEY * around, _NOISE)
     return lines if lines.mean() > _MESH_SHARE else np.zeros_like(lines)

@@ -28,7 +28,9 @@ _OPTIONS: Final = {
     "format_whitelist": _FORMATS,
     "max_pixels": str(_MOST_PIXELS),
 }
+
 _GIF_TAIL: Final = 64
+"""Bytes at the end of a GIF in which its trailer is searched, before padding."""
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,7 @@ def _check_end(
     short = False
     if kind == "matroska" and duration and times is not None:
         step = times[-1] / (len(times) - 1) if len(times) > 1 else 1 / float(rate or 1)
+        # A whole movie lasts a period beyond its last picture, plus half a period for rounding.
         short = duration * 1e-6 > times[-1] + 1.5 * step
     if kind == "gif":
         with path.open("rb") as file:

@@ -1,8 +1,8 @@
 """Points over time, for example from SPH or the material point method."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar, Final
 
@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from chipglow.io.sources.conventions import (
     COMMON_NAMES,
     OTHER_NAMES,
-    Placement,
-    Units,
+    NamedSource,
     match_names,
     simple,
     unit_in_name,
@@ -21,15 +20,7 @@ from chipglow.io.sources.conventions import (
 )
 from chipglow.io.sources.points.files import PointTable, open_points
 from chipglow.io.sources.points.sampling import Cloud, neighbour_distance, sample_cloud
-from chipglow.io.sources.source import (
-    Source,
-    SourceError,
-    Survey,
-    check_times,
-    even_times,
-    naming,
-    span_of,
-)
+from chipglow.io.sources.source import SourceError, Survey, check_times, even_times, naming, span_of
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION, Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
@@ -42,7 +33,7 @@ _FULLEST: Final = 4.0
 
 
 @dataclass(frozen=True)
-class CloudSource(Source, Part):
+class CloudSource(NamedSource, Part):
     """Points over time.
 
     ``files`` are a file with a column or list of times, or a path with ``*``: each file is then a
@@ -53,7 +44,6 @@ class CloudSource(Source, Part):
 
     title: ClassVar[str] = "points"
     files: str = ""
-    names: Mapping[str, str] = field(default_factory=dict)
     spacing: Annotated[
         float | None,
         Parameter(
@@ -72,9 +62,6 @@ class CloudSource(Source, Part):
     thickness: Annotated[
         float | None, Parameter("Thickness of that slab; none: all points.", LENGTH, over=0.0)
     ] = None
-    interval: float | None = None
-    units: Units = field(default_factory=Units)
-    placement: Placement = field(default_factory=Placement)
 
     def survey(self) -> Survey:
         with ExitStack() as stack:

@@ -53,8 +53,8 @@ class PointTable:
         lengths = {len(values) for values in self.columns.values()}
         if len(lengths) != 1 or not 0 < max(lengths) <= MOST_POINTS:
             raise SourceError(
-                f"{self.path}: columns of {sorted(lengths)} points, expected one number from 1 to "
-                f"{MOST_POINTS}"
+                f"{self.path}: columns of {sorted(lengths)} points; all must have the same number "
+                f"of points, from 1 to {MOST_POINTS}"
             )
 
     def numbers(self, label: str) -> NDArray[np.float64]:

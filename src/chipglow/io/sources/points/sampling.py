@@ -23,21 +23,34 @@ _SMOOTHING: Final = 1.4
 """Width of the smooth kernel in spacings of the points."""
 
 _SHARPNESS: Final = 0.75
+"""Width of the sharp kernel, which weights values, in spacings of the points."""
+
 _REACH: Final = 2.0
+"""Distance in spacings up to which neighbours determine a gradient."""
 
 _NEIGHBOURS: Final = 12
 """Neighbours of a point that are searched, for each layer of points."""
 
 _MOST_NEIGHBOURS: Final = 48
+"""Most neighbours of a point, of four layers: limits time and memory."""
 
 _BLOCK_POINTS: Final = 100_000
 """Points that are searched at once."""
 
 _FLAT: Final = 0.02
+"""Ratio of the second moments of neighbours across and along a line below which they lie on it."""
+
 _FAINT: Final = 1e-9
+"""Weight of the smooth kernel relative to the sharp one: it counts only where that is zero."""
+
 _FILLED: Final = 0.5
+"""Filled fraction of a sample at the surface."""
+
 _ORDER, _DISORDER, _COARSEST = 0.38, 0.46, 2.2
+"""Disorder from which and up to which kernels widen (see `_coarseness`), and the largest factor."""
+
 _SHELLS: Final[Mapping[int, tuple[int, float]]] = {2: (12, 2.0), 3: (26, 3.0**0.5)}
+"""By dimension: neighbours of a point of a lattice up to a radius, and the radius in spacings."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -110,6 +123,7 @@ def sample_cloud(cloud: Cloud, raster: Raster) -> tuple[NDArray[np.float32], NDA
 
 def _near(cloud: Cloud, raster: Raster) -> NDArray[np.bool_]:
     """Points that can have a part in a sample, and their neighbours."""
+    # The widest weights reach 1.5 × 1.4 × 2.2 = 4.6 spacings.
     margin = 5.0 * np.maximum(cloud.spacing, raster.spacing)
     left, right, bottom, top = raster.extent
     x, y = cloud.places.T
@@ -213,6 +227,7 @@ def _gradients(neighbours, places, values, spacing, result):  # type: ignore[no-
 
 @njit(cache=True)
 def _bell(distance):  # type: ignore[no-untyped-def]
+    """Return the quadratic B-spline at a distance in its widths; it is zero beyond 1.5."""
     u = abs(distance)
     if u < 0.5:
         return 0.75 - u * u
@@ -221,11 +236,11 @@ def _bell(distance):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _scatter(columns, rows, width, area, values, gradients, totals, weight, fraction):  # type: ignore[no-untyped-def]
-    """Add what every point says to the samples around it; lengths in samples, rows downward."""
+    """Add the expansions of points to the samples around; lengths in samples, rows downward."""
     fields = values.shape[1]
     for p in range(columns.size):
         narrow, wide = max(_SHARPNESS * width[p], 1.0), max(_SMOOTHING * width[p], 1.0)
-        reach = 1.5 * wide
+        reach = 1.5 * wide  # the support of `_bell`
         first_row = max(int(np.ceil(rows[p] - reach)), 0)
         last_row = min(int(np.floor(rows[p] + reach)), fraction.shape[0] - 1)
         first_column = max(int(np.ceil(columns[p] - reach)), 0)
@@ -237,7 +252,7 @@ def _scatter(columns, rows, width, area, values, gradients, totals, weight, frac
                 right = column - columns[p]
                 smooth = wide_y * _bell(right / wide)
                 fraction[row, column] += area[p] / (wide * wide) * smooth
-                # Where no point is near but the area is filled, those farther off say the value.
+                # Where no point is near but the area is filled, farther points determine the value.
                 w = area[p] * (narrow_y * _bell(right / narrow) + _FAINT * smooth)
                 weight[row, column] += w
                 for f in range(fields):
