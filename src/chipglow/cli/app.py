@@ -65,8 +65,8 @@ def main() -> None:
 def _ignored(error: "UnraisableHookArgs") -> None:
     """Take an error that Python ignores, as it came in a callback of a library.
 
-    Ctrl-C counts all the same, as soon as the callback has ended; a lack of memory is one line. What
-    an object that Ctrl-C left half made says when it is deleted is not shown.
+    Ctrl-C counts all the same, as soon as the callback has ended; a lack of memory is one line.
+    What an object that Ctrl-C left half made says when it is deleted is not shown.
     """
     if issubclass(error.exc_type, KeyboardInterrupt):
         again = threading.Timer(_SOON, _interrupt)
