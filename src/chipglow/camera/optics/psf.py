@@ -494,11 +494,11 @@ def _read_netcdf(path: Path) -> MeasuredPSF:
         with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as data:
             kernel = data["kernel"].attrs
             stated = tuple(str(kernel.get("includes", "")).split())
-            limits = kernel.get("band_lower"), kernel.get("band_upper")
+            lower, upper = kernel.get("band_lower"), kernel.get("band_upper")
             estimate, spacing = from_xarray(data, "kernel"), float(kernel["spacing"])
     except ValueError:
         raise
     except HDF5_ERRORS as error:
         raise ValueError(f"truncated, or not a NetCDF-4 file: {error}") from error
-    band = None if None in limits else Band(*map(float, limits))
+    band = None if lower is None or upper is None else Band(float(lower), float(upper))
     return MeasuredPSF(estimate.values, spacing, estimate.components, stated, band)
