@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -22,20 +22,25 @@ from chipglow.quantities import Array
 _LARGEST_STEP: Final = 0.7
 """Largest change of the logarithm of radiance in one step: a factor of two."""
 
-_CONVERGED: Final = 3e-3
-"""Change of the logarithm of radiance, 0.3 %, below which the steps end: 0.2 K at 1000 K."""
+_STEPS: Final = 4
+"""Most steps for each estimate of the weights."""
 
-_STEPS: Final = 2
-"""Steps for each estimate of the weights, which a following one improves."""
+_STEP_ERROR: Final = 2e-3
+"""Error at which steps end, per pixel with data, in standard uncertainties by noise and smoothing.
+
+Errors of solutions are measured by their energy eᵀ H e, whose root bounds the error of any value
+or mean in units of its standard uncertainty. Per pixel it is about the root mean square error of
+the pixels.
+"""
 
 _STEP_TOLERANCE: Final = 3e-2
-"""Relative residual at which the solution of a step ends: a step is repeated."""
+"""Error of a step relative to the step at which it suffices: the next one corrects it."""
 
-_DRAW_TOLERANCE: Final = 1e-2
-"""Relative residual of a draw, far below the scatter of a standard deviation from a few draws."""
+_DRAW_ERROR: Final = 1e-2
+"""Error per pixel of a draw, far below the scatter of a standard deviation from a few draws."""
 
 _CHANGE_TOLERANCE: Final = 1e-3
-"""Relative residual of a change by a single error, which is computed once."""
+"""Relative error of a change by a single error, which may be many standard uncertainties."""
 
 _MOST_ITERATIONS: Final = 200
 """Most iterations of conjugate gradients."""
@@ -182,11 +187,11 @@ class Problem:
         for _ in range(_STEPS):
             check()
             posterior.preconditioner = factor
-            change = posterior.solved(posterior.gradient, _STEP_TOLERANCE)
+            change = posterior.solved(posterior.gradient, _STEP_ERROR, _STEP_TOLERANCE)
+            if not change.any():
+                break
             change = change.clip(-_LARGEST_STEP, _LARGEST_STEP)
             posterior = Posterior(self, posterior.x + change)
-            if np.abs(change).max() < _CONVERGED:
-                break
         posterior.preconditioner = factor
         return posterior
 
@@ -233,11 +238,16 @@ class Posterior:
         light = self.light_change @ change
         return self.problem.formation.forward(light.reshape(self.problem.parts.cells.shape))
 
-    def solved(self, right: Array, tolerance: float) -> Array:
-        """Solve with the Hessian to a relative residual; `right` is (part,) or (part, error)."""
+    def solved(self, right: Array, error: float, relative: float = 0.0) -> Array:
+        """Solve with the Hessian; `right` is (part,) or (part, error).
+
+        The solution ends at an `error` per pixel in standard uncertainties, or at one `relative`
+        to the solution.
+        """
         columns = right.reshape(self.x.size, -1)
+        least = error * np.sqrt(np.count_nonzero(self.pixel_weights))
         solution = _conjugate_gradients(
-            self._product, self.preconditioner.solve, columns, tolerance
+            self._product, self.preconditioner.solve, columns, least, relative
         )
         return solution.reshape(right.shape)
 
@@ -261,18 +271,21 @@ class Posterior:
 
     def drawn_all(self, right_sides: Sequence[Array]) -> Array:
         """Return the changes of the solution for drawn right sides, (draw, part)."""
-        return self._solved_all(right_sides, _DRAW_TOLERANCE)
+        return self._solved_all(right_sides, _DRAW_ERROR)
 
     def changed_all(self, images: Iterable[Array]) -> Array:
         """Return the changes of the solution with changes of the measured radiance."""
-        return self._solved_all([self.response(image) for image in images], _CHANGE_TOLERANCE)
+        responses = [self.response(image) for image in images]
+        return self._solved_all(responses, _STEP_ERROR, _CHANGE_TOLERANCE)
 
-    def _solved_all(self, right_sides: Sequence[Array], tolerance: float) -> Array:
+    def _solved_all(
+        self, right_sides: Sequence[Array], error: float, relative: float = 0.0
+    ) -> Array:
         """Solve for right sides together, a part of them in each thread."""
         columns = np.stack(right_sides, axis=1)
         blocks = np.array_split(columns, min(get_num_threads(), columns.shape[1]), axis=1)
         with ThreadPoolExecutor(len(blocks)) as pool:
-            solved = pool.map(lambda block: self.solved(block, tolerance), blocks)
+            solved = pool.map(lambda block: self.solved(block, error, relative), blocks)
             return np.concatenate(list(solved), axis=1).T
 
     def bias(self) -> Array:
@@ -281,7 +294,7 @@ class Posterior:
         Added once, it halves the order of the bias (iterated regularisation; Engl, Hanke and
         Neubauer, Regularization of Inverse Problems, 5.1).
         """
-        return self.solved(self.bending @ self.x, _STEP_TOLERANCE)
+        return self.solved(self.bending @ self.x, _STEP_ERROR)
 
     def _sent_back(self, image: Array) -> Array:
         """Return the adjoint of `seen_change`."""
@@ -314,8 +327,10 @@ class Posterior:
         sent = self.sent / CELLS_PER_PIXEL**2
         entries = sent, (parts.pixel, np.arange(parts.size))
         image = sparse.csr_array(entries, shape=(self.pixel_weights.size, parts.size))
-        # Pixels without data are seen by others, as far as the blur reaches.
-        cells = self.problem.formation.adjoint(np.sqrt(self.pixel_weights)).ravel()
+        # Pixels without data are seen by others, as far as the blur reaches. Light from beyond the
+        # margin, which continues its edge, reaches all pixels alike and tells them not apart.
+        within = replace(self.problem.formation, beyond="nothing")
+        cells = within.adjoint(np.sqrt(self.pixel_weights)).ravel()
         reach = np.bincount(parts.pixel, parts.area * cells[parts.cell], self.pixel_weights.size)
         weights = _BLURRED_WEIGHT * reach**2
         data = image.T @ sparse.diags_array(weights) @ image
@@ -332,23 +347,26 @@ def _conjugate_gradients(
     product: Callable[[Array], Array],
     precondition: Callable[[Array], Array],
     right: Array,
-    tolerance: float,
+    error: float,
+    relative: float,
 ) -> Array:
-    """Solve for the columns of `right` in step, each to its relative residual."""
+    """Solve for the columns of `right` in step, each to an error in the preconditioner's norm."""
     solution, residual = np.zeros_like(right), right.copy()
-    target = tolerance * np.linalg.norm(right, axis=0)
-    active = np.flatnonzero(target > 0)
-    direction, before = np.zeros((len(right), active.size)), np.ones(active.size)
-    for _ in range(_MOST_ITERATIONS):
-        if not active.size:
-            break
+    active = np.arange(right.shape[1])
+    direction, before, target = np.zeros_like(right), np.ones(active.size), np.zeros(active.size)
+    for iteration in range(_MOST_ITERATIONS):
         preconditioned = precondition(residual[:, active])
         squares = (residual[:, active] * preconditioned).sum(axis=0)
-        direction = preconditioned + direction * (squares / before)
+        if iteration == 0:
+            target = np.maximum(error**2, relative**2 * squares)
+        remains = squares > target[active]
+        if not remains.any():
+            break
+        active, squares, before = active[remains], squares[remains], before[remains]
+        direction = preconditioned[:, remains] + direction[:, remains] * (squares / before)
         image = product(direction)
         step = squares / (direction * image).sum(axis=0)
         solution[:, active] += step * direction
         residual[:, active] -= step * image
-        remains = np.linalg.norm(residual[:, active], axis=0) > target[active]
-        active, before, direction = active[remains], squares[remains], direction[:, remains]
+        before = squares
     return solution

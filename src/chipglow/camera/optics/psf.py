@@ -1,12 +1,13 @@
 """Point spread functions of an infrared camera."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from errno import ENOENT
 from functools import cached_property
 from math import ceil, inf, log, pi, sqrt
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 import scipy
@@ -494,11 +495,17 @@ def _read_netcdf(path: Path) -> MeasuredPSF:
         with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as data:
             kernel = data["kernel"].attrs
             stated = tuple(str(kernel.get("includes", "")).split())
-            lower, upper = kernel.get("band_lower"), kernel.get("band_upper")
+            band = _stated_band(kernel)
             estimate, spacing = from_xarray(data, "kernel"), float(kernel["spacing"])
     except ValueError:
         raise
     except HDF5_ERRORS as error:
         raise ValueError(f"truncated, or not a NetCDF-4 file: {error}") from error
-    band = None if lower is None or upper is None else Band(float(lower), float(upper))
     return MeasuredPSF(estimate.values, spacing, estimate.components, stated, band)
+
+
+def _stated_band(attributes: Mapping[str, Any]) -> Band | None:
+    """Return the band of a kernel, from its attributes in a file; None if none is stated."""
+    if "band_lower" not in attributes or "band_upper" not in attributes:
+        return None
+    return Band(float(attributes["band_lower"]), float(attributes["band_upper"]))
