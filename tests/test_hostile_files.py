@@ -1,9 +1,13 @@
 """Files that declare more than fits, or that are damaged: one line, at once."""
 
 import os
+import signal
 import subprocess
 import sys
+import time
+import weakref
 from collections import namedtuple
+from importlib import import_module
 
 import h5py
 import numpy as np
@@ -18,6 +22,7 @@ from chipglow.scene import Raster
 from chipglow.study import Study, check_cost
 from chipglow.text import MemoryLimitError, check_bounds, check_memory, parse_yaml
 
+commands = import_module("chipglow.cli.app")  # the package has a function of this name
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX")
 
 BILLION = 10**9
@@ -307,3 +312,39 @@ def test_what_no_limit_foresaw_is_one_line(error, text, tmp_path, monkeypatch):
 
     monkeypatch.setattr("chipglow.study.study_text", fails)
     refused(["init", tmp_path / "study.yaml"], text)
+
+
+def test_ctrl_c_in_a_callback_of_a_library_counts(monkeypatch):
+    """Python drops what a callback raises; the command would go on."""
+    monkeypatch.setattr(sys, "unraisablehook", commands._ignored)
+
+    class Thing:
+        pass
+
+    thing = Thing()
+    watch = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        del thing
+        time.sleep(60)  # the second Ctrl-C comes after 0.01 s, and ends this
+    assert time.monotonic() - begin < 30
+    assert watch() is None
+
+
+def test_ctrl_c_before_a_command_begins_is_one_line(monkeypatch, capsys):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(commands, "tolerate_failures", lambda: None)
+    monkeypatch.setattr(commands, "app", interrupted)
+    numbers = {getattr(signal, name, signal.SIGTERM) for name in ("SIGTERM", "SIGHUP")}
+    before = {number: signal.getsignal(number) for number in numbers}  # `main` sets them
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    try:
+        with pytest.raises(SystemExit) as end:
+            commands.main()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert end.value.code == 130
+    assert capsys.readouterr().err == "chipglow: interrupted, nothing was written\n"

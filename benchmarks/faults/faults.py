@@ -36,7 +36,7 @@ from random import Random
 os.environ["NUMBA_NUM_THREADS"] = "1"  # a fork has no threads but the one that made it
 import numpy as np
 
-from chipglow.cli import app
+from chipglow.cli import app, main as main_of_chipglow
 from chipglow.io import write_scene
 from chipglow.io.digest import is_intact
 from chipglow.scene import Raster, Scene
@@ -90,11 +90,11 @@ def run(folder, words, prepare=lambda: None):
             os.dup2(said, number)
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         sys.stdout, sys.stderr = (os.fdopen(number, "w", closefd=False) for number in (1, 2))
-        for name in ("SIGTERM", "SIGHUP", "SIGINT"):
-            signal.signal(getattr(signal, name), signal.default_int_handler)
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # as a shell starts a command
         prepare()
+        sys.argv = ["chipglow", *words]
         try:
-            app(list(words))
+            main_of_chipglow()
         except SystemExit as end:
             code = end.code or 0
         sys.stdout.flush()

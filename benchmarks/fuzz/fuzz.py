@@ -154,11 +154,17 @@ def enter_own_folder(folder):
 
 
 def noted(log):
-    """Return chunks in a log, with their counts."""
+    """Return chunks in a log, with their counts and the cases that were not contained."""
     if not log or not Path(log).exists():
         return {}
     rows = (line.split(",") for line in Path(log).read_text().splitlines())
-    return {(name, int(a), int(b)): list(map(int, counts)) for name, a, b, *counts in rows}
+    return {
+        (name, int(first), int(last)): (
+            list(map(int, counts)),
+            [one for one in wrong.split(";") if one],
+        )
+        for name, first, last, *counts, wrong in rows
+    }
 
 
 def main():
@@ -182,7 +188,9 @@ def main():
             for name in chosen
         ]
         before = noted(log)
-        counts |= {chunk: before[chunk] for chunk in chunks if chunk in before}
+        for chunk in set(chunks) & before.keys():
+            counts[chunk], wrong = before[chunk]
+            escaped += wrong
         todo = [chunk for chunk in chunks if chunk not in before]
         make = get_context("fork").Pool
         with make(given.processes, enter_own_folder, (folder,)) as pool:
@@ -192,7 +200,7 @@ def main():
                 escaped += wrong
                 if log:
                     with log.open("a") as file:
-                        print(*chunk, *found, sep=",", file=file)
+                        print(*chunk, *found, ";".join(wrong), sep=",", file=file)
         os.chdir("/")
     print_table(chosen, counts, seconds)
     cases = sum(map(sum, counts.values()))

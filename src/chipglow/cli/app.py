@@ -2,15 +2,18 @@
 
 import gc
 import signal
+import sys
+import threading
+from _thread import interrupt_main
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
 from chipglow.cli import options as opt
 from chipglow.cli.band import band
-from chipglow.cli.boundary import Boundary
+from chipglow.cli.boundary import INTERRUPTED, Boundary
 from chipglow.cli.budget import budget
 from chipglow.cli.camera import calibrate, psf
 from chipglow.cli.cameras import cameras
@@ -25,6 +28,12 @@ from chipglow.cli.sources import convert, import_source
 from chipglow.cli.streams import tolerate_failures
 from chipglow.cli.studies import cut, error, measure, reproduce, run, wavelengths
 from chipglow.cli.sweep import design, sweep
+
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
+
+_SOON: Final = 0.01
+"""Time in s after which a Ctrl-C that came in a callback is tried again."""
 
 app = typer.Typer(
     cls=Boundary,
@@ -46,7 +55,36 @@ def main() -> None:
         number = getattr(signal, name, signal.SIGTERM)
         if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler)
-    app()
+    sys.unraisablehook = _ignored
+    try:
+        app()
+    except KeyboardInterrupt:  # before the command begins
+        print("chipglow: interrupted, nothing was written", file=sys.stderr)
+        sys.exit(INTERRUPTED)
+
+
+def _ignored(error: "UnraisableHookArgs") -> None:
+    """Take an error that Python ignores, as it came in a callback of a library.
+
+    Ctrl-C counts all the same, as soon as the callback has ended; a lack of memory is one line.
+    What an object that Ctrl-C left half made says when it is deleted is not shown.
+    """
+    if issubclass(error.exc_type, KeyboardInterrupt):
+        again = threading.Timer(_SOON, _interrupt)
+        again.daemon = True
+        again.start()
+    elif issubclass(error.exc_type, MemoryError):
+        print("chipglow: not enough memory for a part of what is shown", file=sys.stderr)
+    elif getattr(error.object, "__name__", "") != "__del__":
+        sys.__unraisablehook__(error)
+
+
+def _interrupt() -> None:
+    """Interrupt the main thread, also while it waits where the system can."""
+    if sys.platform == "win32":
+        interrupt_main()
+    else:
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
 
 
 def _show_version(wanted: bool) -> None:

@@ -87,7 +87,9 @@ def progress_bars() -> Iterator[Report]:
     # Where Ctrl-C shows as ^C behind a bar that fills its line, the next bar would be one too low.
     console.width = max(console.width - _MARGIN, _MARGIN)
     elapsed = "left,", TimeElapsedColumn(), "elapsed"
-    with Progress(*Progress.get_default_columns(), *elapsed, console=console) as bars:
+    columns = *Progress.get_default_columns(), *elapsed
+    # Without a terminal only the end is shown: no thread is needed that refreshes the bars.
+    with Progress(*columns, console=console, auto_refresh=console.is_terminal) as bars:
         tasks: dict[str, TaskID] = {}
 
         def report(step: str, fraction: float) -> None:

@@ -6,31 +6,32 @@ run, as in a pickle: it is a JSON text, followed by the bytes of its arrays.
 
 import json
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields
+from importlib import import_module
 from typing import IO, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.recording import PlanckConversion, Recording
-from chipglow.io.sources.source import SourceError, Survey
+from chipglow.io.sources.source import SourceError
 from chipglow.quantities import Part
-from chipglow.radiometry import Band, ObjectParameters
-from chipglow.scene import SampledFrame
-from chipglow.text import Notes
 
 READY, ANSWER, END = "ready", "answer", "end"
 REFUSED, MISSING = "refused", "missing"
 """Kinds of a message: a process waits for a job, an answer, there are no more; a SourceError, a
 FileNotFoundError."""
 
-_CLASSES: Final[Mapping[str, Any]] = {
-    kind.__name__: kind
-    for kind in (
-        Survey, SampledFrame, Recording, Band, PlanckConversion, ObjectParameters, Notes,
-    )
-}  # fmt: skip
-"""What an answer may consist of, besides numbers, texts, arrays, lists and mappings."""
+_CLASSES: Final[Mapping[str, str]] = {
+    "Survey": "chipglow.io.sources.source",
+    "SampledFrame": "chipglow.scene.frame",
+    "Recording": "chipglow.camera.recording",
+    "PlanckConversion": "chipglow.camera.recording",
+    "Band": "chipglow.radiometry.band",
+    "ObjectParameters": "chipglow.radiometry.object_parameters",
+    "Notes": "chipglow.text.notes",
+}
+"""What an answer may consist of, besides numbers, texts, arrays, lists and mappings: each class by
+its module, so that a reader of meshes does not load what only a recording needs."""
 
 _KINDS: Final = "biufcSU"
 """Kinds of the elements of an array, by NumPy's letters: numbers and texts, no objects."""
@@ -99,10 +100,11 @@ def _plain(value: Any, arrays: list[NDArray[Any]]) -> Any:
         return items if isinstance(value, list) else {"tuple": items}
     if isinstance(value, Mapping):
         return {"mapping": [[str(key), _plain(one, arrays)] for key, one in value.items()]}
-    if is_dataclass(value) and _CLASSES.get(type(value).__name__) is type(value):
-        content = {name: _plain(getattr(value, name), arrays) for name in _given(value)}
-        return {"object": [type(value).__name__, content]}
-    raise TypeError(f"a value of {type(value)}")
+    kind = type(value)
+    if _CLASSES.get(kind.__name__) != kind.__module__:
+        raise TypeError(f"a value of {kind}")
+    content = {name: _plain(getattr(value, name), arrays) for name in _given(value)}
+    return {"object": [kind.__name__, content]}
 
 
 def _given(value: Any) -> list[str]:
@@ -136,7 +138,8 @@ class _Reader:
                 return {key: self.value(one) for key, one in content}
             case "object":
                 name, given = content
-                return _CLASSES[name](**{key: self.value(one) for key, one in given.items()})
+                made_of = getattr(import_module(_CLASSES[name]), name)
+                return made_of(**{key: self.value(one) for key, one in given.items()})
         raise AnswerError(f"a value of kind {kind[:20]!r}")
 
     def _array(self, kind: str, shape: list[int], is_scalar: bool) -> Any:
