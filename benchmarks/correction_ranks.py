@@ -70,8 +70,8 @@ class Simulation:
         names += "rake face", "tool beside it", "mean of the chip"
         return dict(zip(names, [*single, *means], strict=True))
 
-    def ranks(self, seed, draws):
-        """Return the rank of the truth among draws of the posterior, for each place."""
+    def drawn(self, seed, draws):
+        """Return the truth at each place, and draws of the posterior, (draw, place)."""
         generator, problem = np.random.default_rng([60, seed]), self.problem
         x = self.level + self.root @ generator.normal(size=self.root.shape[1])
         seen = Posterior(problem, x).predicted
@@ -79,9 +79,13 @@ class Simulation:
         problem.image = replace(problem.image, radiance=light)
         found = problem.smooth(lambda: None)
         found = problem.smooth(lambda: None, found)
-        drawn = found.x + found.draws(generator, draws)
         weights = np.array(list(self.places().values()))
-        return (drawn @ weights.T < x @ weights.T).sum(axis=0)
+        return weights @ x, (found.x + found.draws(generator, draws)) @ weights.T
+
+    def ranks(self, seed, draws):
+        """Return the rank of the truth among draws of the posterior, for each place."""
+        truth, drawn = self.drawn(seed, draws)
+        return (drawn < truth).sum(axis=0)
 
 
 def chi_squared(ranks, draws, bins):

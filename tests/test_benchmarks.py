@@ -27,6 +27,7 @@ PROGRAMS = {
         "--scenes 1 --cuts 0 --pixels 20 --processes 1 --rows rows.csv",
         {"rake face": 12, "band": 12, "outline found": 3},
     ),
+    "peers/cuqipy_posterior.py": ("--samples 5", {"difference of means": 1, "smallest": 2}),
     "correction_ranks.py": (
         "--simulations 3 --pixels 8",
         {"| middle of the chip": 4, "| rake face": 4},
@@ -89,6 +90,7 @@ PROGRAMS = {
 }
 NEEDED = {
     "correction.py": ("skimage",),
+    "peers/cuqipy_posterior.py": ("cuqi",),
     "app_latency.py": ("panel", "playwright"),
     "fuzz/fuzz.py": ("hypothesis", "lasso", "panel", "pyvista", "tifffile", "zarr"),
     "movies.py": ("av",),

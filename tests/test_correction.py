@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from command import refusal, typed
+from command import refusal, typed, words
 
 from chipglow import AnnularAperturePSF, Band, Camera, Estimate, Measurement, Raster
 from chipglow.camera import Flag, ImageFormation, image_formation
@@ -538,7 +538,5 @@ def test_the_command_refuses_a_tool_outside_the_image(folder):
 
 
 def test_a_point_spread_function_without_a_band_is_assumed_to_fit(folder):
-    output = typed("correct chip.nc --psf psf.nc --emissivity 0.42").output
-    assert "psf.nc states no band: it was measured in that of the image." in " ".join(
-        output.split()
-    )
+    said = words(typed("correct chip.nc --psf psf.nc --emissivity 0.42").output)
+    assert "psf.nc states no band: it was measured in that of the image." in said

@@ -17,7 +17,7 @@ from documented import PAGES, PARTS, ROOT, Reader, blocks
 from matplotlib import pyplot as plt
 
 sys.path.append(str(ROOT / "docs"))
-LANGUAGES = {"python", "console", "yaml", "text"}
+LANGUAGES = {"python", "console", "yaml", "text", "matlab"}
 DIRECTIVES = re.compile(r"\{(eval-rst|include|literalinclude|toctree)\}.*")
 WITH_CODE = [page for page in PAGES if any(one.language in LANGUAGES for one in blocks(page))]
 MOST_NOT_RUN = 15

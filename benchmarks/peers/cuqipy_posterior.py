@@ -1,11 +1,11 @@
 """The posterior of a correction beside CUQIpy's, on a linear Gaussian case.
 
-python benchmarks/peers/cuqipy_posterior.py [--samples 1000] [--out FILE]
+cd benchmarks; python -m peers.cuqipy_posterior [--samples 1000] [--out FILE]
 
 A small image of a chip beside a tool is corrected by one linearised step: data, forward model and
-curvatures are then linear, and all errors normal. CUQIpy (J. Riis et al. (2024), Inverse Problems
-40, 045009) gets the same matrices and samples the posterior by its randomize-then-optimize. It
-needs `pip install cuqipy`; `tests/reference/cuqipy_posterior.csv` is the output for tests without.
+curvatures are then linear, and all errors normal. CUQIpy (N. A. B. Riis et al. (2024), Inverse
+Problems 40, 045009) gets the same matrices and samples the posterior by randomize-then-optimize. It
+needs `pip install cuqipy`; `tests/reference/cuqipy_posterior.csv` is the output, for the tests.
 """
 
 from pathlib import Path

@@ -1,5 +1,6 @@
 """Images, lines and numbers at a state of the controls; states share the stages they agree on."""
 
+from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
@@ -475,14 +476,36 @@ class SceneModel:
         return scene.field(name, index)
 
 
+class _FramesModel(ABC):
+    """Frames whose true temperature is not known."""
+
+    coarse: ClassVar[None] = None
+
+    @property
+    @abstractmethod
+    def times(self) -> Array:
+        """Times of the frames in s."""
+
+    def frame(self, state: State) -> int:
+        """Return the frame that began nearest to the state's start."""
+        return int(np.abs(self.times - state.study.start).argmin())
+
+    def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
+        """Return nothing: an error is not known without the truth."""
+        return {}
+
+
 @dataclass(eq=False)
-class MeasurementModel:
+class MeasurementModel(_FramesModel):
     """A measurement, its controls, and its frames as pictures."""
 
     name: str
     measurement: Measurement
     controls: Controls
-    coarse: ClassVar[None] = None
+
+    @property
+    def times(self) -> Array:
+        return self.measurement.times
 
     @property
     def raster(self) -> Raster:
@@ -500,7 +523,7 @@ class MeasurementModel:
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
         """Return the frame that began nearest to the state's start."""
         measurement = self.measurement
-        index, raster = self._index(state), measurement.raster
+        index, raster = self.frame(state), measurement.raster
         reference, label = measurement.data.get(REFERENCE), ""
         # The error is stated of pixels out of range too, as it is for a scene.
         measured = measurement.radiance_temperature(flagged=reference is not None)[index]
@@ -517,13 +540,9 @@ class MeasurementModel:
         lines, crossings = _lines(state, raster, data), _crossings(state, measurement.tool)
         return Picture(state, raster, data, panels, lines, crossings, reference=label)
 
-    def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
-        """Return nothing: the true temperature of a measurement is not known."""
-        return {}
-
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the numbers at the cursor in K, with the calibration's uncertainty if known."""
-        measurement, index = self.measurement, self._index(picture.state)
+        measurement, index = self.measurement, self.frame(picture.state)
         data = picture.data
         if measurement.calibration_errors is not None:
             effects = measurement.calibration_effects(index)[None]
@@ -531,18 +550,14 @@ class MeasurementModel:
             data = data.assign(uncertainty=(("y", "x"), estimate.standard_uncertainty[0]))
         return _at(data, picture.raster, picture.state.cursor)
 
-    def _index(self, state: State) -> int:
-        return int(np.abs(self.measurement.times - state.study.start).argmin())
-
 
 @dataclass(eq=False)
-class CorrectionModel:
+class CorrectionModel(_FramesModel):
     """A correction that `chipglow correct` wrote, its controls, and its frames as pictures."""
 
     name: str
     correction: Correction
     controls: Controls
-    coarse: ClassVar[None] = None
     tool: ClassVar[None] = None
     images: ClassVar[tuple[str, ...]] = ("measured", "corrected", "half_width")
 
@@ -550,10 +565,13 @@ class CorrectionModel:
     def raster(self) -> Raster:
         return self.correction.raster
 
+    @property
+    def times(self) -> Array:
+        return np.asarray(self.correction.data["time"].values, np.float64)
+
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
         """Return the frame that began nearest to the state's start."""
-        frame = int(np.abs(self.correction.data["time"].values - state.study.start).argmin())
-        corrected, raster = Corrected(self.correction, frame=frame), self.raster
+        corrected, raster = Corrected(self.correction, frame=self.frame(state)), self.raster
         measured = corrected.data["measured"].values
         data = xr.Dataset(
             {"measured": (("y", "x"), measured), "flagged": (("y", "x"), np.isnan(measured))}
@@ -567,10 +585,6 @@ class CorrectionModel:
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the measured temperature at the cursor in K."""
         return _at(picture.data, picture.raster, picture.state.cursor)
-
-    def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
-        """Return nothing: an error is not known without the truth."""
-        return {}
 
 
 Model: TypeAlias = SceneModel | MeasurementModel | CorrectionModel

@@ -26,7 +26,6 @@ def sentences(facts: Facts, rows: Mapping[str, Row]) -> Iterator[str]:
     words = texts()["correction"]
     for window in windows:
         for place in window.places:
-            cells = _cells(rows, slug(place.name), "degC")
             reach = float(place.estimate.expanded_uncertainty())
             yield facts.text(
                 words["place"],
@@ -34,31 +33,26 @@ def sentences(facts: Facts, rows: Mapping[str, Row]) -> Iterator[str]:
                 surface=place.surface,
                 pixels=int(place.pixels.sum()),
                 is_held=abs(float(place.estimate.values) - place.true) <= reach,
-                low=cells["corrected_low"],
-                high=cells["corrected_high"],
-                measured=cells["measured"],
-                corrected=cells["corrected"],
-                truth=cells["true"],
+                low=_number(rows, place.name, "corrected_low_degC"),
+                high=_number(rows, place.name, "corrected_high_degC"),
+                measured=_number(rows, place.name, "measured_degC"),
+                corrected=_number(rows, place.name, "corrected_degC"),
+                truth=_number(rows, place.name, "true_degC"),
             )
     for window in windows:
-        cells = _cells(rows, slug(window.surface), "rms_K")
-        held = rows[f"{slug(window.surface)}_held_percent"].cells["mean"]
         yield facts.text(
             words["window"],
             surface=window.surface,
-            held=held,
+            held=_number(rows, window.surface, "held_percent"),
             uncertainty=window.emissivity_uncertainty,
-            **cells,
+            measured=_number(rows, window.surface, "measured_rms_K"),
+            corrected=_number(rows, window.surface, "corrected_rms_K"),
         )
 
 
-def _cells(rows: Mapping[str, Row], start: str, end: str) -> dict[str, str]:
-    """Return the texts of numbers whose keys have this start and end, by the rest of the key."""
-    return {
-        key.removeprefix(f"{start}_").removesuffix(f"_{end}"): row.cells["mean"]
-        for key, row in rows.items()
-        if key.startswith(f"{start}_") and key.endswith(f"_{end}")
-    }
+def _number(rows: Mapping[str, Row], name: str, key: str) -> str:
+    """Return the text of a number of a place or of the part with a surface."""
+    return rows[f"{slug(name)}_{key}"].cells["mean"]
 
 
 def images(facts: Facts) -> Figure | None:
