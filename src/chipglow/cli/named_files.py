@@ -6,6 +6,7 @@ from contextlib import suppress
 from errno import ELOOP
 from glob import glob, has_magic
 from itertools import islice
+from os.path import isdir
 from pathlib import Path
 from typing import Any, Final
 
@@ -58,9 +59,8 @@ def _check_folder(text: str) -> None:
 
     Such as a Zarr store or a case of OpenFOAM.
     """
-    with suppress(OSError, ValueError):  # text that is no name, or a folder that others change
-        if not text or not Path(text).is_dir():
-            return
+    if not text or not isdir(text):  # noqa: PTH112  Path refuses text that is too long for a name
+        return
     for path in islice(Path(text).rglob("*"), _MOST_ENTRIES):
         check_regular(path)
 
