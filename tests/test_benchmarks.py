@@ -27,6 +27,7 @@ PROGRAMS = {
         "--scenes 1 --cuts 0 --pixels 20 --processes 1 --rows rows.csv",
         {"rake face": 12, "band": 12, "outline found": 3},
     ),
+    "correction_speed.py": ("--sides 16 20", {"16 x 16": 11, "20 x 20": 11, "exponent": 5}),
     "correction_ranks.py": (
         "--simulations 3 --pixels 8",
         {"| middle of the chip": 4, "| rake face": 4},
@@ -82,6 +83,7 @@ PROGRAMS = {
 }
 NEEDED = {
     "correction.py": ("skimage",),
+    "correction_speed.py": ("skimage",),
     "app_latency.py": ("panel", "playwright"),
     "fuzz/fuzz.py": ("hypothesis", "lasso", "pyvista", "tifffile", "zarr"),
     "movies.py": ("av",),
