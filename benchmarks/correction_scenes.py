@@ -141,7 +141,9 @@ def analytic(seed, pixels):
     chip += rise * profile(kind, from_band / (width * PITCH / 2.355))
     netd = drawn_netd(draw)
     black = BAND.radiance(np.where(to_tool > 0, tool, chip))
-    image = seen(black, to_tool > 0, samples, view, netd, draw)
+    # Samples that the outline cuts are of both: stairs would displace it by a part of a sample.
+    in_tool = np.clip(0.5 + to_tool / samples.spacing, 0, 1)
+    image = seen(black, in_tool, samples, view, netd, draw)
     black, to_tool, from_band = map(inner, (black, to_tool, from_band))
     distance, band = means(to_tool), np.abs(means(from_band))
     in_tool = means(to_tool > 0) > 0.5
@@ -338,7 +340,7 @@ def drawn_netd(draw):
 
 def seen(black, in_tool, samples, pixels, netd, draw):
     """Return the noisy image of the radiance on samples."""
-    shining = np.where(in_tool, *EMISSIVITY[::-1]) * black
+    shining = (EMISSIVITY[0] + (EMISSIVITY[1] - EMISSIVITY[0]) * in_tool) * black
     image = image_formation(CAMERA, samples, pixels=pixels).forward(shining)
     return image + draw.normal(0, netd * float(BAND.slope(600.0)), image.shape)
 

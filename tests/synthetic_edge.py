@@ -114,7 +114,7 @@ def edge_radiance(edge, normal, side=40, position=1e-6, background=2.0, step=5.0
     return background + step * np.einsum("iajb,a,b->ij", fractions, weight / 2, weight / 2)
 
 
-def image_of(radiance, noise=0.0, seed=0, saturation=None, name="edge", wavelength=WAVELENGTH):
+def image_of(radiance, noise=0.0, seed=0, saturation=None, name="edge", band=BAND):
     """The image of a pixel with noise, cut off at its saturation."""
     radiance = radiance + np.random.default_rng(seed).normal(0.0, 1.0, radiance.shape) * noise
     rows, columns = radiance.shape
@@ -129,7 +129,7 @@ def image_of(radiance, noise=0.0, seed=0, saturation=None, name="edge", waveleng
         saturated,
         none,
         PITCH,
-        wavelength,
+        band,
         name,
     )
 

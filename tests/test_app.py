@@ -121,8 +121,8 @@ def test_the_numbers_are_those_of_the_pixel_and_the_sample(model):
     calibration = camera.calibration(picture.raster.shape)
     assert numbers["uncertainty"] == calibration.netd(numbers["measured"])
     frame = scene.frame(int(np.searchsorted(scene.times, state.study.start + 5e-6 + 1e-12)) - 1)
-    # The image of the scene is in °C, in 32 bits.
     true = nearest(frame.temperature, scene.raster, at)
+    # The image of the scene is in °C, in 32 bits: 3e-5 K, and K are added again.
     assert numbers["sample temperature"] == pytest.approx(true, abs=1e-3)
     laid = camera.prepare(surface, scene).emissivity(frame)
     assert numbers["sample emissivity"] == nearest(laid, scene.raster, at)
@@ -197,6 +197,7 @@ def test_the_app_opens_where_the_shear_band_is_hottest_with_the_line_on_its_ridg
 
 def test_the_rake_face_is_marked_where_its_line_enters_the_tool(model):
     picture = model.picture(model.controls.initial)
+    # Half the distance between points of a line.
     assert picture.crossings["rake_line"] == pytest.approx(60, abs=0.5)
     assert "band_line" not in picture.crossings
 
@@ -323,6 +324,7 @@ def test_draws_are_those_of_other_pixels_and_textures(model):
     pixels = second.pixels(exposure.raster)
     # The draws blur the samples once for all pixels: other rounding.
     at_cursor = nearest(errors["case_1"].values, pixels, state.cursor)
+    # Rounding in K.
     assert drawn.error.values[1, 1] == pytest.approx(at_cursor, abs=1e-9)
     points = state.line("band_line").line(pixels.spacing).points
     measured = sample(errors["measured"].values, pixels, points) - ZERO_CELSIUS
@@ -457,8 +459,10 @@ def test_what_is_saved_can_be_opened(model, tmp_path, reference):
         for one, more in ((again, {}), (model, {"analysis.reference": reference}))
     )
     for name in ("reference", "measured", "case_1"):
+        # Rounding in K.
         assert again.numbers(seen)[name] == pytest.approx(model.numbers(shown)[name], abs=1e-9)
     for name in ("reference", "measured"):
+        # Rounding in K.
         np.testing.assert_allclose(
             seen.lines["rake_line"][name], shown.lines["rake_line"][name], atol=1e-9
         )

@@ -120,7 +120,8 @@ def test_a_linear_field_is_read_exactly_along_a_given_curve():
     temperature = 700.0 + 1e5 * X - 5e4 * Y
     profile = band_profile(measured([temperature]), TOOL, curve=STRAIGHT, width=24e-6)
     x, y = profile.points[0].T
-    np.testing.assert_allclose(profile.temperature[0], 700.0 + 1e5 * x - 5e4 * y, atol=1e-6)
+    # Temperatures are found from radiances to 1.6e-10: 1.1e-7 K.
+    np.testing.assert_allclose(profile.temperature[0], 700.0 + 1e5 * x - 5e4 * y, atol=1.2e-7)
     assert profile.distance[0] == pytest.approx(np.hypot(30e-6, 30e-6))
     assert profile.distance[-1] - profile.distance[0] == pytest.approx(np.hypot(2e-4, 2e-4))
     assert profile.stage == (Stage.NONE,)
@@ -157,12 +158,12 @@ def test_the_position_s_uncertainty_is_that_of_curves_that_are_off(shift, error)
     off = error * np.random.default_rng(5).standard_normal((2000, 1, 2))
     away = image.at(profile.points[0] + off) - image.at(profile.points[0])
     spread = np.sqrt((away**2).mean(axis=0))
-    # 2000 draws are good to 2 %; slope and bend are taken over two pixels, which takes up to 10 %
-    # of those of a Gaussian 3.3 pixels wide, and up to 0.1 K of what vanishes.
     middle = slice(5, -5)
     mean = np.sqrt((spread[middle] ** 2).mean())
     stated = np.sqrt((profile.estimate.standard_uncertainty[0][middle] ** 2).mean())
-    assert stated == pytest.approx(mean, rel=0.15, abs=0.1)
+    # 2000 draws are good to 2 %; slope and bend are taken over two pixels, which takes up to 10 %
+    # of those of a Gaussian 3.3 pixels wide, and up to 0.1 K of what vanishes.
+    assert stated == pytest.approx(mean, rel=0.12, abs=0.1)
 
 
 # The stage
@@ -256,12 +257,15 @@ def test_the_command_writes_what_it_shows(file, tmp_path):
     profile = band_profile(read_measurement(file), TOOL, reference=1)
     values = [float(row["radiance_temperature_degC"] or "nan") for row in rows]
     there = np.isfinite(profile.points[..., 0])
-    np.testing.assert_allclose(values, profile.temperature[there] - 273.15, atol=1e-3)
+    # Nine printed digits.
+    np.testing.assert_allclose(values, profile.temperature[there] - 273.15, atol=1e-6)
     for cause in ("calibration", "position"):
         parts = [float(row[f"{cause}_uncertainty_K"] or "nan") for row in rows]
         expected = profile.estimate.contribution(cause)[there]
-        np.testing.assert_allclose(parts, expected, atol=1e-3)
+        # Nine printed digits.
+        np.testing.assert_allclose(parts, expected, atol=1e-7)
         (line,) = (line.split() for line in said.splitlines() if cause in line)
+        # Two printed digits.
         assert float(line[-1]) == pytest.approx(np.nanmax(expected), rel=0.05)
     assert {row["tool_along_uncertainty_K"] for row in rows} == {""}
     assert [row["stage"] for row in rows].count("developing") == there[0].sum()

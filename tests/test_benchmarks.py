@@ -53,7 +53,14 @@ PROGRAMS = {
         f"--cell {COARSEST} --length 0.6 paper",
         {"paper  cutting force": 1, "paper  thickness": 1, "paper  contact": 1, "paper  250": 7},
     ),
-    "fuzz/fuzz.py": ("--cases 10 --only .npz", {"| grid.npz |": 7, "| all |": 6, "10 cases": 2}),
+    "faults/faults.py": (
+        "--cases 1",
+        {**dict.fromkeys(("| killed |", "| full |", "| damaged |"), 5), "| all | 8 ": 5},
+    ),
+    "fuzz/fuzz.py": (
+        "--cases 20 --only .npz .yaml .message",
+        {**dict.fromkeys(("| grid.npz |", "| study.yaml |", "| 0.message |"), 7), "| all |": 6},
+    ),
     "knife_edge.py": (
         "--repeats 1 diffraction Gaussian,",
         {"diffraction, noise 0.03": 3, "Gaussian, clipped at 90 %": 4, "| diffraction": 5},
@@ -85,13 +92,13 @@ NEEDED = {
     "correction.py": ("skimage",),
     "correction_speed.py": ("skimage",),
     "app_latency.py": ("panel", "playwright"),
-    "fuzz/fuzz.py": ("hypothesis", "lasso", "pyvista", "tifffile", "zarr"),
+    "fuzz/fuzz.py": ("hypothesis", "lasso", "panel", "pyvista", "tifffile", "zarr"),
     "movies.py": ("av",),
     "rasterise.py": ("pyvista",),
     "sweeps.py": ("distributed",),
 }
 # Programs that fork, spawn processes or drive a browser run in a process of their own.
-OWN_PROCESS = ("app_latency.py", "fuzz/fuzz.py", "sweeps.py")
+OWN_PROCESS = ("app_latency.py", "faults/faults.py", "fuzz/fuzz.py", "sweeps.py")
 
 
 @pytest.fixture
@@ -141,8 +148,8 @@ def test_a_program_prints_its_table(program, run):
         os.environ.get("CHIPGLOW_CHROMIUM") or shutil.which("chromium")
     ):
         pytest.skip("needs Chromium, which is not installed")
-    if program == "fuzz/fuzz.py" and sys.platform != "linux":
-        pytest.skip("fuzz.py limits its forks as Linux does")
+    if program in ("faults/faults.py", "fuzz/fuzz.py") and sys.platform != "linux":
+        pytest.skip("limits its forks as Linux does")
     if program in STUDIES:
         name, text = STUDIES[program]
         Path(name).write_text(text, encoding="utf-8")

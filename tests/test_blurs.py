@@ -5,6 +5,7 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 from scipy.special import erf
+from tolerances import DOUBLE
 
 from chipglow import camera as cam
 from chipglow.camera.optics.pupil import annular_transfer
@@ -36,7 +37,7 @@ def test_variances_add_and_the_squares_count_once(blur, across, up, spacing):
     # Sheppard's correction of squares that are wider than the Gaussian holds within 1e-3.
     np.testing.assert_allclose(found, [own + across, own + up], rtol=2e-3)
     view = psf.view_kernel(spacing, 40, 50)
-    assert view.sum() == pytest.approx(1.0, abs=1e-12)
+    assert view.sum() == pytest.approx(1.0, abs=DOUBLE)
     assert (view >= 0).all()
 
 
@@ -62,7 +63,7 @@ def test_blurs_multiply_and_keep_far_light():
     wide, beyond = (one.view_kernel(4e-6, 100, 100)[:30] for one in (psf, cam.AnnularAperturePSF()))
     # Farther than 32 widths it is left as it is, and nothing is moved to where that ends.
     np.testing.assert_allclose(wide, beyond, rtol=1e-4)
-    assert kernel.sum() == pytest.approx(1.0, abs=1e-12)
+    assert kernel.sum() == pytest.approx(1.0, abs=DOUBLE)
     change = psf.view_kernel(4e-6, 100, 100) - cam.AnnularAperturePSF().view_kernel(4e-6, 100, 100)
     place = 4e-6 * np.arange(-100, 101)
     assert np.abs(change[np.hypot(place, place[:, None]) > 150e-6]).sum() < 2e-3

@@ -19,6 +19,9 @@ from chipglow.laboratory.recordings import load_measurement
 from chipglow.quantities.units import parse_unit
 from chipglow.scene import Raster
 
+FAR_BELOW = 1e-12
+"""In m and s: a ten-millionth of a pixel, a billionth of the time between frames."""
+
 PITCH = 10e-6
 ROWS, COLUMNS, FRAMES = 6, 8, 3
 X = 5e-6 + PITCH * np.arange(COLUMNS)
@@ -68,9 +71,9 @@ def check_both(path, expected=None, **options):
     kelvins, raster = imported(path, **options)
     np.testing.assert_allclose(kelvins, expected, **CLOSE)
     assert recording.pitch == pytest.approx(raster.spacing)
-    assert recording.position == pytest.approx((raster.left, raster.top), abs=1e-12)
-    assert (raster.left, raster.top) == pytest.approx((0.0, 30e-6), abs=1e-12)
-    np.testing.assert_allclose(recording.times, TIMES, atol=1e-12)
+    assert recording.position == pytest.approx((raster.left, raster.top), abs=FAR_BELOW)
+    assert (raster.left, raster.top) == pytest.approx((0.0, 30e-6), abs=FAR_BELOW)
+    np.testing.assert_allclose(recording.times, TIMES, atol=FAR_BELOW)
 
 
 # Orientation
@@ -229,7 +232,7 @@ def test_both_commands_write_the_same_temperatures_at_the_same_places(tmp_path):
     run("import", path, "--set", "completion.motion=none", "--out", scene)
     seen, fields = read_measurement(measured), xr.open_dataset(scene)
     for axis in ("x", "y"):
-        np.testing.assert_allclose(seen.data[axis], fields[axis], atol=1e-12)
+        np.testing.assert_allclose(seen.data[axis], fields[axis], atol=FAR_BELOW)
     # Radiance of 32 bits, and its inverse: 1e-6 of 400 K.
     np.testing.assert_allclose(seen.radiance_temperature(), fields["temperature"], atol=2e-3)
     fields.close()
@@ -303,6 +306,7 @@ def test_packed_temperatures_are_the_same_in_both(tmp_path, unit, packing, write
 def test_a_scale_and_an_offset(tmp_path):
     path = npy(np.rint((CELSIUS + 40.0) / 0.04).astype(np.uint16), tmp_path)
     recording = convert(path, unit="degC", scale=0.04, offset=-40.0, interval=1e-3)
+    # Half a step of 0.04 K, and 32 bits.
     np.testing.assert_allclose(recording.signal, truth(), rtol=0, atol=0.0201)
     units = Units(temperature=parse_unit("degC", "K", "temperature"))
     told = {"units": units, "scale": 0.04, "offset": -40.0}
@@ -450,10 +454,10 @@ def test_a_series_of_files_is_upright_and_in_time(tmp_path, data, packing):
     close = {"rtol": 0, "atol": 0.016} if packing else CLOSE
     recording = convert(path, **stated)
     np.testing.assert_allclose(recording.signal, expected, **close)
-    np.testing.assert_allclose(recording.times, 1e-3 * np.arange(len(expected)), atol=1e-12)
+    np.testing.assert_allclose(recording.times, 1e-3 * np.arange(len(expected)), atol=FAR_BELOW)
     kelvins, raster = imported(path, **stated)
     np.testing.assert_allclose(kelvins, expected, **close)
-    assert (raster.left, raster.top) == pytest.approx((0.0, 30e-6), abs=1e-12)
+    assert (raster.left, raster.top) == pytest.approx((0.0, 30e-6), abs=FAR_BELOW)
 
 
 def test_files_of_a_series_at_other_places_are_refused(tmp_path):
@@ -479,7 +483,7 @@ def test_coordinates_of_a_mesh_grid(tmp_path, reverse):
     recording, (kelvins, raster) = convert(path), imported(path)
     np.testing.assert_allclose(recording.signal, truth()[:1], **CLOSE)
     np.testing.assert_allclose(kelvins, truth()[:1], **CLOSE)
-    assert recording.position == pytest.approx((raster.left, raster.top), abs=1e-12)
+    assert recording.position == pytest.approx((raster.left, raster.top), abs=FAR_BELOW)
 
 
 def test_coordinates_of_a_curved_grid_are_not_used_and_said(tmp_path):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from serrated_chip import SerratedChip
+from tolerances import SINGLE
 
 from chipglow.chip import chip_metrics
 from chipglow.scene import Material, Raster, Scene
@@ -32,7 +33,7 @@ def test_thickness_and_segments(metrics):
     assert metrics.valley_standard_deviation < missed
     # The sum over 61 frames is a rectangle rule; the last window's ends miss half a frame each.
     assert metrics.thickness == pytest.approx(CHIP.thickness, abs=SAMPLE)
-    assert metrics.ratio == pytest.approx(CHIP.feed / CHIP.thickness, rel=0.01)
+    assert metrics.ratio == pytest.approx(CHIP.feed / CHIP.thickness, rel=SAMPLE / CHIP.thickness)
     degree = (CHIP.peak - CHIP.valley) / CHIP.peak
     # Both errors above, over the peak.
     assert metrics.degree == pytest.approx(degree, abs=2 * (missed + SAMPLE) / CHIP.peak)
@@ -40,15 +41,20 @@ def test_thickness_and_segments(metrics):
 
 def test_period_spacing_and_speeds(metrics):
     # A peak is off by less than the 1 µs that are smoothed over; five periods share both ends.
-    assert metrics.period == pytest.approx(CHIP.period, rel=0.005)
-    assert metrics.frequency == pytest.approx(1 / CHIP.period, rel=0.005)
-    assert metrics.speed == pytest.approx(CHIP.speed, rel=1e-6)
-    assert metrics.spacing == pytest.approx(CHIP.speed * CHIP.period, rel=0.005)
+    of_period = 1e-6 / (5 * CHIP.period)
+    assert metrics.period == pytest.approx(CHIP.period, rel=of_period)
+    assert metrics.frequency == pytest.approx(1 / CHIP.period, rel=of_period)
+    assert metrics.speed == pytest.approx(CHIP.speed, rel=SINGLE)
+    assert metrics.spacing == pytest.approx(CHIP.speed * CHIP.period, rel=of_period)
     # A mean over two periods in steps of 2.4 µs: half a step at either end of 144 µs.
     assert metrics.chip_speed == pytest.approx(CHIP.chip_speed, rel=0.015)
-    assert metrics.chip_spacing == pytest.approx(CHIP.chip_speed * CHIP.period, rel=0.02)
+    # The errors of speed and period.
+    assert metrics.chip_spacing == pytest.approx(
+        CHIP.chip_speed * CHIP.period, rel=0.015 + of_period
+    )
     swing = CHIP.unsteadiness * CHIP.chip_speed / np.sqrt(2)
-    assert metrics.chip_speed_standard_deviation == pytest.approx(swing, rel=0.05)
+    # Twice the error of the mean, as a square.
+    assert metrics.chip_speed_standard_deviation == pytest.approx(swing, rel=0.03)
 
 
 def test_the_mean_is_over_the_chips_length_not_over_time():
@@ -122,7 +128,7 @@ def test_what_the_view_cuts_is_unknown():
 def test_less_than_a_period_gives_no_thickness_and_contact_beyond_the_view_is_unknown():
     metrics = chip_metrics(replace(CHIP, frames=40, contact=1e-3).scene())
     assert np.isnan([metrics.thickness, metrics.contact]).all()
-    assert metrics.speed == pytest.approx(CHIP.speed, rel=1e-6)
+    assert metrics.speed == pytest.approx(CHIP.speed, rel=SINGLE)
 
 
 def without_history(scene):

@@ -186,6 +186,7 @@ ENDINGS = {
     ("wavelengths", "--out"): ".csv",
     ("budget", "--out"): ".csv",
     ("design", "--out"): ".csv",
+    ("band", "--out"): ".csv",
     ("register", "--out"): ".yaml or .yml",
     ("register", "--pairs"): ".csv",
     ("register", "--blink"): ".gif",
@@ -203,7 +204,7 @@ QUANTITIES = [
     (name, option.opts[0])
     for name, command in COMMANDS.items()
     for option in command.params
-    if option.metavar in ("TEMPERATURE", "KELVINS", "LENGTH", "TIME")
+    if option.metavar in ("TEMPERATURE", "KELVINS", "LENGTH", "TIME", "SPEED")
 ]
 
 
@@ -213,7 +214,8 @@ def required(name):
         if parameter.required:
             option = parameter.opts[0]
             yield from ((option,) if option.startswith("--") else ())
-            yield {"TEMPERATURE": "300 K"}.get(parameter.metavar, "none.nc")
+            values = {"TEMPERATURE": "300 K", "KELVINS": "300 K", "LENGTH": "20 um"}
+            yield values.get(parameter.metavar, "none.nc")
 
 
 @pytest.mark.parametrize(("command", "option"), FILES)
@@ -276,6 +278,7 @@ def test_measure_writes_frames_at_the_camera_rate(folder, scene):
     (folder / "study.yaml").write_text("camera: {frame_rate: 60 kHz}")
     result = chipglow("measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc")
     measurement = read_measurement("m.nc")
+    # In s: far below an exposure.
     np.testing.assert_allclose(measurement.times, [0.0, 1 / 60e3], atol=1e-12)
     assert measurement.data.attrs["surface"] == "chip 1"
     # The analytic chip goes on beyond the view, bands and all.

@@ -92,6 +92,7 @@ def test_the_true_temperature_is_that_of_the_mean_radiance(scene, analysis):
     radiance = [band.radiance(scene.field("temperature", frame)[own]) for frame in frames]
     # Radiance is tabulated to 1e-4 of itself, which is 0.02 K.
     expected = float(band.temperature(np.mean(radiance)))
+    # Twice in the mean and its inverse, and rounded.
     assert window.true[row, column] == pytest.approx(expected, abs=0.05)
 
 

@@ -173,6 +173,7 @@ def test_contact_shares_friction_heat_and_loses_none():
     work, before, of_tool = block.friction.sum(), block.held(), block.heat_of_tool()
     block.contact()
     assert work > 0
+    # Energy is conserved; a change of the sum is rounded by 1e-16 of the whole.
     assert block.held() - before == pytest.approx(work, rel=1e-8)
     assert not block.friction.any()
     assert not block.points["contact_time"].any()
@@ -305,6 +306,7 @@ def test_what_is_lost_is_missing():
     before = warm.held()
     lost = sum(warm.lose(loss, 1e-6) for _ in range(20))
     assert lost > 0
+    # Energy is conserved; a change of the sum is rounded by 1e-16 of the whole.
     assert before - warm.held() == pytest.approx(lost, rel=1e-9)
     cooled = warm.tool_temperature < 600.0
     # Only the tool's skin is cooled directly, as it does not conduct here.

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.integrate import quad
 from test_reflections import RASTER, a_scene, apparent
+from tolerances import DOUBLE, SINGLE
 
 from chipglow.surface import Fresnel, UniformSurface, Wedge
 
@@ -16,7 +17,7 @@ INDICES = st.floats(1.05, 30.0)
 @given(INDICES, st.floats(0.0, 30.0))
 def test_at_right_angles_it_is_the_known_form(n, k):
     assert Fresnel(n=n, k=k).emissivity(1.0) == pytest.approx(
-        4 * n / ((n + 1) ** 2 + k**2), rel=1e-9
+        4 * n / ((n + 1) ** 2 + k**2), rel=DOUBLE
     )
 
 
@@ -24,14 +25,14 @@ def test_at_right_angles_it_is_the_known_form(n, k):
 def test_at_brewsters_angle_one_polarisation_is_not_reflected(n):
     across = (n**2 - 1) / (n**2 + 1)
     found = Fresnel(n=n, k=0.0).emissivity(cos(atan(n)))
-    assert found == pytest.approx(1 - across**2 / 2, rel=1e-9)
+    assert found == pytest.approx(1 - across**2 / 2, rel=DOUBLE)
 
 
 @given(st.floats(0.1, 30.0), st.floats(0.0, 30.0), st.floats(0.0, 1.0))
 def test_it_is_an_emissivity_and_none_at_grazing(n, k, cosine):
     law = Fresnel(n=n, k=k)
     assert -1e-12 <= law.emissivity(cosine) <= 1 + 1e-12
-    assert law.emissivity(0.0) == pytest.approx(0.0, abs=1e-12)
+    assert law.emissivity(0.0) == pytest.approx(0.0, abs=DOUBLE)
 
 
 def test_a_good_metal_emits_four_thirds_into_the_hemisphere():
@@ -62,7 +63,7 @@ def test_a_tilted_camera_sees_the_plane_at_that_angle():
         surface.prepare(scene).emissivity(scene.frame(0))
         for surface in (UniformSurface(0.3), UniformSurface(0.3).modified(law))
     )
-    np.testing.assert_allclose(tilted, plain * law.ratio(0.5), rtol=1e-6)
+    np.testing.assert_allclose(tilted, plain * law.ratio(0.5), rtol=SINGLE)
     full = UniformSurface(0.95).modified(law).prepare(scene).emissivity(scene.frame(0))
     assert full.max() == 1.0
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from tolerances import DOUBLE
 
 from chipglow.analysis import Headline
 from chipglow.analysis.distribution import COVERAGE, TOGETHER, Distribution
@@ -36,7 +37,7 @@ def test_parts_by_hand():
     assert found["a"].standard_deviation == pytest.approx(np.sqrt(200.0))
     assert found["a"].fraction == pytest.approx(400 / 404)
     assert found["b"].fraction == pytest.approx(4 / 404)
-    assert found[TOGETHER].fraction == pytest.approx(0.0, abs=1e-12)
+    assert found[TOGETHER].fraction == pytest.approx(0.0, abs=DOUBLE)
     # Only the combination of both: no mean of either differs.
     both = Distribution(np.array([[1.0, -1.0], [-1.0, 1.0]]), ("a", "b")).parts
     assert both[TOGETHER].fraction == pytest.approx(1.0)
@@ -49,7 +50,7 @@ def test_fractions_sum_to_one(seed, shape):
     values = drawn(np.random.default_rng(seed), shape, (5.0, 3.0, 1.0), 2.0)
     found = Distribution(values, CAUSES).parts
     total = sum(part.fraction for part in found.values())
-    assert total == pytest.approx(1.0 if values.size > 1 else 0.0, abs=1e-9)
+    assert total == pytest.approx(1.0 if values.size > 1 else 0.0, abs=DOUBLE)
 
 
 @pytest.mark.parametrize(

@@ -74,8 +74,8 @@ def test_handbook_forces_are_those_of_their_correlations():
         for value in entry.published:
             if value.kind == "correlation":
                 factor, exponent = fits[value.quantity, value.source]
-                # Written in whole N/mm.
                 expected = 1e3 * factor * (1e3 * entry.feed) ** exponent
+                # Written in whole N/mm.
                 assert value.value == pytest.approx(expected, abs=0.5e3)
                 checked += 1
     assert checked == 12

@@ -404,7 +404,7 @@ def test_scale_and_offset_of_gdal_are_applied(tmp_path, items, kelvins, said):
     text = f"<GDALMetadata>{items}</GDALMetadata>"
     path = tiff(tmp_path / "a.tif", IMAGE, extratags=[(42112, "s", 0, text, True)])
     recording = read(path, unit=None if said == "remarks" else "counts")
-    np.testing.assert_allclose(recording.signal[0], kelvins, rtol=1e-6)
+    np.testing.assert_allclose(recording.signal[0], kelvins, rtol=SINGLE)
     notes = {kind: any("GDAL" in text for text in found)
              for kind, found in vars(recording.notes).items()}  # fmt: skip
     assert notes == {kind: kind == said for kind in notes}

@@ -240,6 +240,7 @@ def test_every_format_gives_back_what_was_written(tmp_path, write):
     path, options = write(tmp_path)
     source = CloudSource(str(path), **options)
     survey = source.survey()
+    # In s: times of 1e-6 s are rounded to 1e-22 s.
     np.testing.assert_allclose(survey.times, TIMES, atol=1e-15)
     np.testing.assert_allclose(survey.extent, (0, COLUMNS * A, 0, ROWS * A), atol=1e-3 * A)
     assert survey.found["temperature"] == "temperature"
@@ -293,6 +294,7 @@ def test_placement_turns_places_and_vectors(tmp_path):
     source = CloudSource(str(tmp_path / "p.npz"), placement=placement)
     left, right, bottom, top = source.survey().extent
     assert (left, right) == pytest.approx((-1e-6, COLUMNS * A - 1e-6))
+    # In m: far below a spacing.
     assert (bottom, top) == pytest.approx((-ROWS * A, 0.0), abs=1e-12)
     raster = Raster(5e-6, -5e-6, 1e-6, 20, 30)
     (frame,) = source.frames(raster)

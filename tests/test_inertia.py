@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
+from tolerances import DOUBLE
 
 from chipglow.chip import Inertia, inertia
 from chipglow.cli.progress import say_of_cut
@@ -35,7 +36,7 @@ def test_kinetic_fraction_is_the_greatest_after_the_build_up():
     kinetic[3] = 500.0  # the shock of the entry
     kinetic[time.size // 2] = 0.007 * work[time.size // 2]
     found = inertia(scene_with(drive_work=work, kinetic_energy=kinetic))
-    assert found.kinetic_fraction == pytest.approx(0.007, rel=1e-12)
+    assert found.kinetic_fraction == pytest.approx(0.007, rel=DOUBLE)
     assert np.isnan(found.force_fraction)
 
 
@@ -75,7 +76,8 @@ def test_momentum_flow_of_the_papers_cut():
     simulation = CuttingSimulation(CuttingConditions(), numerics=Numerics(mass_scaling=100.0))
     # 785 000 kg/m³ × (4.16667 m/s)² × 0.3 mm: 13.6 MPa on 0.3 mm.
     assert AISI_1045.density_at(293.15) == 7850.0
-    assert simulation.momentum_flow == pytest.approx(4088.5, rel=1e-4)
+    # Half of the last digit.
+    assert simulation.momentum_flow == pytest.approx(4088.5, abs=0.05)
     faster = replace(simulation, numerics=Numerics(mass_scaling=50.0))
     assert faster.momentum_flow == simulation.momentum_flow / 2
 

@@ -449,6 +449,7 @@ def test_a_width_on_a_node_of_its_table_is_found():
     """A tail of no light: the width is 50 of the table's steps, but for rounding."""
     model = GaussianTailModel()
     for fwhm in np.linspace(8e-6, 16e-6, 200):
+        # The width is solved for.
         assert model.fwhm(np.array([fwhm, 0.0, 0.72])) == pytest.approx(fwhm, rel=1e-9)
 
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import yaml
 from command import chipglow
+from tolerances import DOUBLE
 
 from chipglow.cutting import (
     AISI_1045,
@@ -193,13 +194,13 @@ def test_elastic_constants_over_the_temperature(tmp_path):
     rows = "value: [[300 K, 0.3], [500 K, 0.35]]\n"
     moving = workpiece(str(_write(path, "value: 0.3\n", rows)))
     # Half way in both tables: E = (199 + 184) / 2 GPa at 300 degC, nu held at 0.35 from 500 K on.
-    assert moving.shear_modulus_at(573.15) == pytest.approx(191.5e9 / 2.7, rel=1e-12)
-    assert moving.bulk_modulus_at(573.15) == pytest.approx(191.5e9 / 0.9, rel=1e-12)
+    assert moving.shear_modulus_at(573.15) == pytest.approx(191.5e9 / 2.7, rel=DOUBLE)
+    assert moving.bulk_modulus_at(573.15) == pytest.approx(191.5e9 / 0.9, rel=DOUBLE)
     ratios = moving.elastic_ratios()
     assert ratios.shape == (2801, 4)
     cold = [moving.shear_modulus_at(293.15), moving.bulk_modulus_at(293.15)]
     hot = [moving.shear_modulus_at(700.0), moving.bulk_modulus_at(700.0)]
-    assert ratios[500, :2] == pytest.approx(np.divide(hot, cold), rel=1e-12)
+    assert ratios[500, :2] == pytest.approx(np.divide(hot, cold), rel=DOUBLE)
     # K is largest where Poisson's ratio has risen and E has not yet fallen much.
     kelvins = np.arange(200.0, 3001.0)
     stiffness = moving.bulk_modulus_at(kelvins) + 4 / 3 * moving.shear_modulus_at(kelvins)
@@ -207,7 +208,7 @@ def test_elastic_constants_over_the_temperature(tmp_path):
     # Sound is fastest a little above, where the material is lighter.
     squares = stiffness / moving.density_at(kelvins)
     assert squares.argmax() >= 300 and squares.max() < 1.01 * squares[300]
-    assert moving.sound_speed() ** 2 == pytest.approx(squares.max(), rel=1e-12)
+    assert moving.sound_speed() ** 2 == pytest.approx(squares.max(), rel=DOUBLE)
     still = replace(moving, young_modulus=2e11, poisson_ratio=0.3, density=7850.0)
     assert still.elastic_ratios().tolist() == [[1.0, 1.0, 1.0, 0.0]]
 
@@ -304,6 +305,7 @@ def test_draws_of_fitted_damage_have_its_covariance_and_follow_from_the_seed():
     centre = np.log([getattr(small, name) for name in NAMES])
     # Standard error of a variance of 4000 draws: 2.2 %; of the means 0.008.
     assert np.cov(logs.T) == pytest.approx(np.array(COVARIANCE), abs=0.02)
+    # Four standard errors.
     assert logs.mean(axis=0) == pytest.approx(centre, abs=0.03)
     assert np.ptp(logs[:, 0] - logs[:, 1]) < 1e-6  # d1 and d2 go together
     assert fitted.draw(small, np.random.default_rng(7)) == draws[7]

@@ -11,6 +11,7 @@ import yaml
 from analytic_chip import AnalyticChip
 from command import run, settings_of
 from PIL import Image
+from tolerances import SINGLE
 
 from chipglow.camera import (
     DeadElements,
@@ -249,6 +250,7 @@ def test_frames_are_chosen_as_in_python(text, chosen, tmp_path):
 def test_the_measurement_holds_the_truth_within_its_uncertainty(laboratory):
     measured = load_measurement("chip.yaml")
     assert measured.times == pytest.approx(2e-3 * np.arange(5))
+    # In m: far below a pixel.
     assert measured.raster.extent == pytest.approx((-120e-6, 120e-6, 0.0, 180e-6), abs=1e-12)
     dead = DETECTOR.terms[1].mask(SHAPE, DETECTOR.seed)
     assert dead.any()
@@ -294,7 +296,7 @@ def test_object_parameters_are_said_or_as_recorded(laboratory, tmp_path):
     np.testing.assert_allclose(plain.radiance_temperature(), 900.0, atol=1e-3)
     told = load_measurement(tmp_path / "shown.npy", [*settings, "object_parameters.emissivity=0.5"])
     expected = 0.5 * BAND.radiance(900.0) + 0.5 * BAND.radiance(293.15)
-    np.testing.assert_allclose(told.radiance, expected, rtol=1e-6)
+    np.testing.assert_allclose(told.radiance, expected, rtol=SINGLE)
     assert "emissivity 0.5" in told.data.attrs["object_parameters"]
 
 

@@ -165,6 +165,7 @@ def test_a_picture_shows_nothing_where_nothing_is_and_the_end_of_a_scale_beyond_
     assert all((panel_colour(picture, drawn, panel) == void).all() for panel in range(3))
     drawn = picture.draw(frame_of(temperature=2000.0, strain=50.0, rate=0.0))
     for panel, name, fraction in ((0, HEAT, 1.0), (1, "cividis", 1.0), (2, "viridis", 0.0)):
+        # Colours of 8 bits are rounded.
         np.testing.assert_allclose(
             panel_colour(picture, drawn, panel), colour(name, fraction), atol=1
         )

@@ -8,8 +8,9 @@ from scipy.special import erf
 from synthetic_edge import edge_radiance, gaussian_edge, image_of, tailed_edge
 from tolerances import DOUBLE
 
-from chipglow.camera import MeasuredPSF
+from chipglow.camera import Camera, MeasuredPSF
 from chipglow.laboratory.psf import knife_edge, psf_kernel, write_psf
+from chipglow.radiometry import Band
 from chipglow.uncertainty import Cause, Component
 
 FWHM = 10e-6
@@ -58,9 +59,15 @@ def test_the_file_keeps_the_components(gaussian, tmp_path):
     again = MeasuredPSF.from_file(tmp_path / "psf.nc")
     np.testing.assert_allclose(again.weights, psf.weights, rtol=DOUBLE)
     assert again.estimate.names == psf.estimate.names
+    assert again.band == Band(3.8e-6, 5.1e-6)
+    refused = r"band 3\.8 um to 5\.1 um, expected that of the camera, 8 um"
+    with pytest.raises(ValueError, match=refused):
+        Camera(psf=again, band=Band(8e-6, 12e-6))
+    # `in_band` is for those who want the same kernel elsewhere.
+    assert Camera(psf=again).in_band(Band(8e-6, 12e-6)).psf.fwhm == again.fwhm
     assert encircled(again, 5e-6).standard_uncertainty > 1e-4
     away = encircled(again, 5e-6) - encircled(psf, 5e-6)
-    assert away.standard_uncertainty == pytest.approx(0.0, abs=1e-12)
+    assert away.standard_uncertainty == pytest.approx(0.0, abs=DOUBLE)
 
 
 def test_the_parts_are_those_of_the_width():
@@ -87,6 +94,6 @@ def test_components_are_scaled_with_the_weights():
     # w / s with w = 2 ± 2 and s = 18 ± 2: 2/18 − 2·2/18² in the middle, −2·2/18² beside it.
     expected = np.full((3, 3), -4 / 18**2)
     expected[1, 1] += 2 / 18
-    np.testing.assert_allclose(psf.estimate.effect("noise"), expected, rtol=1e-12)
+    np.testing.assert_allclose(psf.estimate.effect("noise"), expected, rtol=DOUBLE)
     with pytest.raises(ValueError, match="has effects on 9 values, expected 25"):
         MeasuredPSF(np.ones((5, 5)), 1e-6, psf.components)

@@ -14,6 +14,9 @@ from chipglow.radiometry import Band
 from chipglow.scene import Raster, ToolGeometry, ToolOutline
 from chipglow.text import DescriptionError
 
+FAR_BELOW = 1e-12
+"""In m: far below a pixel."""
+
 BAND = Band(3.8e-6, 5.1e-6)
 RASTER = Raster(left=-400e-6, top=400e-6, spacing=6e-6, rows=70, columns=80)
 PIXEL = RASTER.spacing
@@ -74,7 +77,7 @@ def test_squares_on_the_pixels_are_plain_means_of_nine():
         assert abs(grid.standard_deviation[0, m, n] - square.std(ddof=1)) < EXACT
     np.testing.assert_allclose(grid.along[:2], [9e-6, 27e-6])
     np.testing.assert_allclose(grid.depth, 18e-6 * (np.arange(5) + 0.5))
-    np.testing.assert_allclose(grid.corners()[2, 5] - foot, [-36e-6, 90e-6], atol=1e-12)
+    np.testing.assert_allclose(grid.corners()[2, 5] - foot, [-36e-6, 90e-6], atol=FAR_BELOW)
 
 
 @pytest.mark.parametrize("flag", [Flag.UNDER_RANGE, Flag.SATURATED, Flag.DEAD])
@@ -142,12 +145,14 @@ OUTLINE = ToolOutline.placed([(-20e-6, 300e-6), (0.0, 30e-6), (10e-6, 0.0), (300
 def test_a_placed_tool_is_the_tool_moved(tool, tmp_path):
     placed = tool.at((120e-6, -40e-6))
     moved = np.array(placed.tip)
-    np.testing.assert_allclose(placed.rake_foot, tool.rake_foot + moved, atol=1e-12)
-    np.testing.assert_allclose(placed.edge_point, tool.edge_point + moved, atol=1e-12)
-    np.testing.assert_allclose(placed.outline(1e-4), tool.outline(1e-4) + moved, atol=1e-12)
+    np.testing.assert_allclose(placed.rake_foot, tool.rake_foot + moved, atol=FAR_BELOW)
+    np.testing.assert_allclose(placed.edge_point, tool.edge_point + moved, atol=FAR_BELOW)
+    np.testing.assert_allclose(placed.outline(1e-4), tool.outline(1e-4) + moved, atol=FAR_BELOW)
     x, y = np.meshgrid(RASTER.x, RASTER.y)
     np.testing.assert_allclose(
-        placed.signed_distance(x + moved[0], y + moved[1]), tool.signed_distance(x, y), atol=1e-12
+        placed.signed_distance(x + moved[0], y + moved[1]),
+        tool.signed_distance(x, y),
+        atol=FAR_BELOW,
     )
     write_measurement(measured(linear_image()).with_tool(placed), tmp_path / "m.nc")
     stored = read_measurement(tmp_path / "m.nc").tool

@@ -308,6 +308,7 @@ def test_the_image_is_turned_mirrored_and_placed():
     assert turned.raster.shape == (3, 2)
     # The tip is in the middle of the pixel in column 0 and row 2.
     assert turned.raster.x[0] == pytest.approx(0.0, abs=1e-15)
+    # In m: places of 1e-4 m are rounded to 1e-20 m.
     assert turned.raster.y[2] == pytest.approx(0.0, abs=1e-15)
     upside = ImagePosition(mirror="vertical").place(signal)
     np.testing.assert_array_equal(upside[0], signal[0, ::-1])

@@ -54,7 +54,8 @@ def test_view_factor_of_a_groove(angle):
     exchange = Exchange(*groove(np.radians(angle), 12))
     factors, lengths = view_factors(exchange), exchange.lengths
     found = lengths[:12] @ factors[:12, 12:24].sum(axis=1)
-    assert found == pytest.approx(1 - np.sin(np.radians(angle) / 2), abs=5e-4)
+    # One of the 2048 rays.
+    assert found == pytest.approx(1 - np.sin(np.radians(angle) / 2), abs=1 / 2048)
 
 
 def test_view_factor_of_opposite_strips():
@@ -74,7 +75,7 @@ def test_rows_have_the_sum_one_and_are_reciprocal(angle, radius, count):
     plate = lines([near + thick, far + thick, far - thick, near - thick, near + thick])
     exchange = Exchange(np.concatenate([starts, plate[0]]), np.concatenate([ends, plate[1]]))
     factors = view_factors(exchange)
-    np.testing.assert_allclose(factors.sum(axis=1), 1.0, rtol=1e-13)
+    np.testing.assert_allclose(factors.sum(axis=1), 1.0, rtol=DOUBLE)
     sent = exchange.lengths[:, None] * factors[:, :-1]
     # Rays are a lattice whose rows have up to √2048 = 45 points. Where an end of the bar is seen
     # along a row, half of it may count on the wrong side; the bar has two ends.
@@ -207,7 +208,7 @@ def test_energy_is_conserved(first, second, angle, surroundings):
 def test_the_wedge_is_as_wide_and_deep_as_its_arc():
     wedge = Wedge(angle=np.radians(30), bulge_radius=80e-6, overhang=5e-6)
     side = wedge.outline
-    np.testing.assert_allclose(side[0], [0, -45e-6], atol=1e-18)
+    np.testing.assert_allclose(side[0], [0, -45e-6], atol=DOUBLE * 45e-6)
     np.testing.assert_allclose(side[-1], [80e-6 * np.cos(np.radians(30)), -5e-6])
     first = side[1] - side[0]
     # The first chord of 24, graded as the square, is a 1152th of the arc's turn from its tangent.
@@ -242,7 +243,8 @@ def test_finer_elements_change_little(monkeypatch):
     finer, fine = Wedge().effective_emissivity(CHIP, TOOL)
     beyond = depth > 1e-6
     expected = np.interp(depth, finer, fine)
-    np.testing.assert_allclose(coarse[beyond], expected[beyond], atol=6e-3)
+    # 1e-3 was seen; an emissivity is measured to 0.01.
+    np.testing.assert_allclose(coarse[beyond], expected[beyond], atol=2e-3)
 
 
 def test_a_mirror_shows_the_rake_face_only_where_the_side_is_steep():
@@ -252,7 +254,7 @@ def test_a_mirror_shows_the_rake_face_only_where_the_side_is_steep():
     _, found = wedge.effective_emissivity(CHIP, TOOL, tool_radiance=0.0)
     assert (found >= CHIP - 1e-12).all()
     assert found[0] > CHIP + 0.05
-    assert found[-1] == pytest.approx(CHIP, abs=1e-12)
+    assert found[-1] == pytest.approx(CHIP, abs=DOUBLE)
 
 
 # ---- on a scene

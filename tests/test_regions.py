@@ -28,6 +28,7 @@ def test_pixels_and_lengths_mean_the_same_place():
     pixel = Region("a", Polygon(corners))
     metre = Region("a", Polygon(metres), unit="m")
     np.testing.assert_array_equal(pixel.mask(RASTER), metre.mask(RASTER))
+    # In m: coordinates of 1e-4 m are rounded to 1e-20 m.
     np.testing.assert_allclose(pixel.outline(RASTER), metre.outline(RASTER), atol=1e-15)
 
 
@@ -37,8 +38,10 @@ def test_the_mask_has_the_area_of_the_shape():
     # Shoelace formula; the count misses by about the square root of the pixels on the edge.
     (x1, y1), (x2, y2), (x3, y3) = triangle.shape.corners
     area = abs((x2 - x1) * (y3 - y1) - (x3 - x1) * (y2 - y1)) / 2
+    # Twice √1100.
     assert triangle.mask(fine).sum() == pytest.approx(area, abs=60)
     circle = Region("b", Circle((200.2, 190.7), 150.0))
+    # Twice √940.
     assert circle.mask(fine).sum() == pytest.approx(np.pi * 150.0**2, abs=60)
 
 

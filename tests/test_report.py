@@ -249,6 +249,7 @@ def test_the_picture_of_the_answer_is_of_the_shown_exposure(result, facts):
     assert np.isnan(error[flagged]).all() and np.isnan(measured[flagged]).all()
     # The error of the developed instant by the analysis; images are drawn as they are stored.
     np.testing.assert_allclose(error[~flagged], shown.error_case_1.values[~flagged], atol=1e-9)
+    # Rounding in K.
     np.testing.assert_allclose(error, measured - reference, atol=1e-9)
 
 
@@ -257,6 +258,7 @@ def test_the_parts_of_an_error_are_all_of_it(result, facts):
     assert list(rows) == ["rake_error_degC", "band_error_degC", "band_worst_error_degC"]
     for row in rows.values():
         total = sum(part.values for part in row.parts.values())
+        # Rounding in K.
         np.testing.assert_allclose(total, row.draws.values, atol=1e-9)
     assert set(rows["band_error_degC"].parts) == {"psf", "motion", "footprint"}
     assert set(rows["band_worst_error_degC"].parts) == {"psf", "rest"}
@@ -364,6 +366,7 @@ def test_the_summary_is_strict_json(folder, result, facts):
         assert summary["draws"][key]["count"] == 12
         assert summary["one_draw"][key] == one_draw(result.data, name).error
         celsius = facts.headlines[name].reference.mean - 273.15
+        # Rounding in K.
         assert summary["references"][key] == pytest.approx(celsius, abs=1e-9)
         parts = summary["causes"][key]
         assert list(parts) == ["segment", "texture", "pixel phase", "causes together"]

@@ -175,8 +175,8 @@ def test_uncertainty_and_degrees_of_freedom_are_those_of_the_guide(key):
 def test_the_uncertainty_of_the_frequency_is_its_change_with_the_period():
     step = 1e-5 * PERIOD.x
     slope = (1 / (PERIOD.x + step) - 1 / (PERIOD.x - step)) / (2 * step)
-    # A central difference of 1/T over a relative step h is off by h^2.
     expected = 1e-3 * abs(slope) * PERIOD.u
+    # A central difference of 1/T over a relative step h is off by h², 1e-10.
     assert shown("segment_frequency_kHz").uncertainty == pytest.approx(expected, rel=1e-9)
 
 
@@ -257,6 +257,7 @@ def test_the_rows_of_a_report_are_these_numbers(chip_analysis):
     frequency = next(row for row in rows["chip"] if row.key == "segment_frequency_kHz")
     # Student's factor for two degrees of freedom: 4.30.
     expected = 4.302653 * MEASURED["segment_frequency_kHz"].u
+    # Student's factor has seven digits.
     assert frequency.expanded_uncertainty == pytest.approx(expected, rel=1e-6)
 
 

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 from command import chipglow, refused
 from drawn import in_a_notebook, on_given_axes, on_new_axes
+from tolerances import SINGLE
 from undrawn import leave_undrawn
 
 from chipglow.analysis import (
@@ -116,10 +117,10 @@ def test_emissivity_follows_the_temperature():
     ramp = np.linspace(500.0, 800.0, RASTER.columns) * np.ones((RASTER.rows, 1))
     frame = plate(ramp).frame(0)
     expected = np.clip(0.2 + 0.6 * (ramp - 600.0) / 100.0, 0.2, 0.8)
-    np.testing.assert_allclose(metal.prepare(plate()).emissivity(frame), expected, atol=1e-6)
+    np.testing.assert_allclose(metal.prepare(plate()).emissivity(frame), expected, atol=SINGLE)
     melting = TemperatureSurface(((500.0, 0.2), (650.0, 0.2), (650.0, 0.5), (800.0, 0.5)))
     expected = np.where(ramp.astype(np.float32) < 650.0, 0.2, 0.5)
-    np.testing.assert_allclose(melting.prepare(plate()).emissivity(frame), expected, atol=1e-6)
+    np.testing.assert_allclose(melting.prepare(plate()).emissivity(frame), expected, atol=SINGLE)
     for table, wrong in (
         (((600.0, 0.2),), "2 or more"),
         (((700.0, 0.2), (600.0, 0.3)), "ascending"),

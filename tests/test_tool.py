@@ -23,6 +23,9 @@ from chipglow.scene import (
 )
 from chipglow.scene.tool_surface import surface_bound, surface_distance
 
+INTERSECTION = 1e-9
+"""Relative rounding of lengths between intersections, of lines at small angles too."""
+
 CHAMFERED = ToolGeometry(chamfer=Chamfer(100e-6, radians(20.0)))
 WATERFALL = ToolGeometry(hone=Hone(80e-6, 40e-6))
 BREAKER = ToolOutline.placed(
@@ -130,14 +133,15 @@ def test_distance_is_that_to_the_nearest_of_many_points_on_the_outline(tool, see
 def test_the_normal_is_the_gradient_and_leads_from_the_surface(tool, seed):
     for x, y in places(seed, 50):
         distance, nx, ny = surface_distance(x, y, tool.surface)
-        assert hypot(nx, ny) == pytest.approx(1.0, abs=1e-12)
+        assert hypot(nx, ny) == pytest.approx(1.0, abs=DOUBLE)
         foot = (x - distance * nx, y - distance * ny)
         assert abs(tool.signed_distance(*foot)) < 1e-15
         # Half-way to the surface the nearest place and the normal are the same.
         half = (x - 0.5 * distance * nx, y - 0.5 * distance * ny)
         if abs(distance) > 1e-9:
+            # Places are rounded to 1e-20 m, which turns a normal over 1e-9 m by 1e-11.
             assert surface_distance(*half, tool.surface) == pytest.approx(
-                (0.5 * distance, nx, ny), abs=1e-9
+                (0.5 * distance, nx, ny), abs=1e-10
             )
 
 
@@ -197,6 +201,7 @@ def test_the_middle_of_a_round_edge_is_its_edge_point():
     np.testing.assert_allclose(
         tool.edge_point, tool.edge_radius * (1 - 1 / np.sqrt(2)), rtol=DOUBLE
     )
+    # In m; places of 1e-4 m are rounded to 1e-20 m.
     assert BREAKER.signed_distance(*BREAKER.edge_point) == pytest.approx(0.0, abs=1e-15)
 
 
@@ -207,7 +212,7 @@ def test_width_and_angle_of_the_chamfer_are_those_of_the_sharp_outline(tool):
     land = (upper - lower) / np.hypot(*(upper - lower))
     normal = np.array([-land[1], land[0]])
     on_land = lower + tool.edge_radius * normal
-    assert np.hypot(*(upper - lower)) == pytest.approx(tool.land, rel=1e-9)
+    assert np.hypot(*(upper - lower)) == pytest.approx(tool.land, rel=INTERSECTION, abs=0)
     assert land @ np.array(tool.rake_direction) == pytest.approx(cos(tool.chamfer.angle))
     corners = []
     for foot, direction in (
@@ -216,20 +221,22 @@ def test_width_and_angle_of_the_chamfer_are_those_of_the_sharp_outline(tool):
     ):
         along, _ = np.linalg.solve(np.stack([land, -np.array(direction)], axis=1), foot - on_land)
         corners.append(along)
-    assert corners[0] - corners[1] == pytest.approx(tool.chamfer.width, rel=1e-9)
+    assert corners[0] - corners[1] == pytest.approx(tool.chamfer.width, rel=INTERSECTION, abs=0)
     # The flat between its rounded corners is on the surface, with the land's normal.
     for fraction in (0.01, 0.5, 0.99):
         place = lower + fraction * (upper - lower) + (tool.edge_radius + 1e-6) * normal
-        assert surface_distance(*place, tool.surface) == pytest.approx((1e-6, *normal), abs=1e-9)
+        assert surface_distance(*place, tool.surface) == pytest.approx((1e-6, *normal), abs=DOUBLE)
 
 
 @given(HONED)
 @FEW
 def test_a_hone_leaves_the_faces_where_it_should(tool):
     sharp, outline = sharp_edge(tool), tool.outline(1e-3)
-    assert np.hypot(*(tool.rake_foot - sharp)) == pytest.approx(tool.hone.rake, rel=1e-9)
+    assert np.hypot(*(tool.rake_foot - sharp)) == pytest.approx(
+        tool.hone.rake, rel=INTERSECTION, abs=0
+    )
     foot = outline[-1] - 1e-3 * np.array(tool.clearance_direction)
-    assert np.hypot(*(foot - sharp)) == pytest.approx(tool.hone.clearance, rel=1e-9)
+    assert np.hypot(*(foot - sharp)) == pytest.approx(tool.hone.clearance, rel=INTERSECTION, abs=0)
     # The ellipse as a rational curve of Bezier: the weight sin(wedge / 2) makes K = 1 a circle.
     wedge = pi / 2 - tool.rake_angle - tool.clearance_angle
     u = np.linspace(0.0, 1.0, 33)
@@ -244,6 +251,7 @@ def test_faces_of_a_sampled_wedge_are_found():
     outline = ToolOutline.placed(sampled(tool) + np.array([3e-3, -2e-3]))
     # Up to 0.2 um of the arc belongs to a face of 1 mm.
     assert outline.rake_angle == pytest.approx(tool.rake_angle, abs=0.3e-3)
+    # The other face, the same.
     assert outline.clearance_angle == pytest.approx(tool.clearance_angle, abs=0.3e-3)
     assert np.hypot(*(outline.rake_foot - tool.rake_foot)) < 4e-6
     points = places(5)
@@ -255,6 +263,7 @@ def test_faces_of_a_sampled_wedge_are_found():
 def test_a_worn_flank_is_part_of_the_edge():
     tool = ToolOutline.placed(1e-6 * np.array([(-5, 400), (0, 0), (80, 0), (400, 40)]))
     assert degrees(tool.clearance_angle) == pytest.approx(degrees(np.arctan2(40, 320)))
+    # In m: far below any outline.
     np.testing.assert_allclose(tool.rake_foot, [0.0, 0.0], atol=1e-12)
     assert tool.signed_distance(40e-6, -7e-6) == pytest.approx(7e-6)
 
@@ -302,6 +311,7 @@ def test_an_outline_is_read_in_any_unit_of_length_and_from_any_origin(content, t
     (tmp_path / "edge.csv").write_bytes(content)
     expected = 1e-6 * np.array([(0, 500), (0, 20), (20, 0), (600, 60)])
     corners = read_tool_outline(tmp_path / "edge.csv").corners
+    # In m: some roundings of 6e-4 m, each 7e-20 m.
     np.testing.assert_allclose(corners, expected, atol=1e-18)
 
 

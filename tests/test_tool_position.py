@@ -54,6 +54,7 @@ def test_displacements_are_those_of_a_tool_that_is_moved_and_turned(kind, angle,
     other = moved(tool, small, *np.eye(3)[kind])
     here, there = (t.rake_point(up) + into * np.array(t.rake_normal) for t in (tool, other))
     found = small.displacements(tool, here)[kind]
+    # A millionth of displacements of 1e-8 m.
     np.testing.assert_allclose(found, there - here, atol=1e-14)
 
 
@@ -186,6 +187,7 @@ def test_the_place_of_a_found_tool_is_uncertain_and_position_wins(folder):
         if uncertainty:
             most = np.nanmax(grid.frame_estimate.contribution("tool across"))
             (line,) = (line.split() for line in text.splitlines() if "tool across" in line)
+            # Two printed digits.
             assert float(line[-1]) == pytest.approx(most, rel=0.05)
 
 

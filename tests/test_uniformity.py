@@ -119,6 +119,7 @@ def test_one_pixel_is_a_region_with_its_own_noise():
     assert np.isfinite(found.expanded_uncertainty())
     # Of 24 pixels around it, to 15 %.
     alone = temperature(single, pixel).estimate
+    # Three times 15 %.
     assert alone.contribution("noise") == pytest.approx(kelvins, rel=0.45)
     assert np.isnan(alone.contribution("repeatability"))
     row = em.determine_emissivity([single], em.Heating(TRUE)).of(pixel)

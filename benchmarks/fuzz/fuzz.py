@@ -1,14 +1,19 @@
 """Outcomes of reading damaged files.
 
-    python benchmarks/fuzz/fuzz.py [--cases 100000] [--only .vtu .npz]
+    python benchmarks/fuzz/fuzz.py [--cases 100000] [--only .vtu .npz] [--processes 2] [--log FILE]
 
-Files of every format are damaged, and each is read in a fork of this process, with limits of memory
-and time as the product sets them. Whatever is no plain refusal is read once more the way the
-product does, in `chipglow.io.sandbox`, and has to end in one `SourceError` there (three of a kind
-and file). After 50 hangs a file is left. The command fails if a case is not contained. Linux only.
+Files of every format, YAML of every kind and messages to the app are damaged, and each is read in a
+fork of this process, with limits of memory and time as the product sets them. Whatever is no plain
+refusal is read once more the way the product does, in `chipglow.io.sandbox` where it uses one, and
+has to end in one error there (three of a kind and hundred cases).
+
+The change is determined by the file and the number of the case, so that --first continues a
+campaign; cases that --log notes are not run again. After 5 hangs the rest of a hundred cases is
+left. The command fails if a case is not contained. Linux only.
 """
 
 import gc
+import json
 import os
 import re
 import resource
@@ -16,37 +21,40 @@ import signal
 import sys
 import tempfile
 from collections import Counter
-from contextlib import suppress
-from itertools import islice
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from random import Random
 from time import perf_counter
 
-from seeds import source_of, write_seeds
+os.environ["NUMBA_NUM_THREADS"] = "1"  # a fork has no threads but the one that made it
+from targets import SNIPPETS, target_of, write_targets
 
-from chipglow.io.sandbox import Isolated, limit_memory
-from chipglow.io.sources import SourceError
-from chipglow.scene import Raster
+from chipglow.io.sandbox import Sandbox, limit_memory
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common import arguments, print_head, print_row
 
-RASTER = Raster(0.0, 1.0, 1.0 / 24, 24, 24)
-PATIENCE, MEMORY, ENOUGH_HANGS = 4, 1024**3, 50
+PATIENCE, MEMORY, ENOUGH_HANGS, CHUNK = 4, 1024**3, 5, 100
 OUTCOMES = ("read", "refused", "stumbled", "memory", "crash", "hang")
 CHANGES = ("cut", "byte", "word", "number", "repeat", "remove", "splice")
+VALUES = (
+    None, True, -1, 10**400, 1e308, float("nan"), "", "0", "-40,200", "1e999 um", "a" * 10_000,
+    "../x", "\0", "\ud800", [], {}, [[]], {"a": {}}, ["1 um"] * 1000, {"camera.pitch": "1e-23 m"},
+    {"cursor": "1e300,0"}, {"surface.emissivity": "0"}, "change", "draw", "save", "chip", "theme",
+)  # fmt: skip
 NUMBERS = (b"0", b"-1", b"1e308", b"nan", b"inf", b"99999999999", b"4294967295", b"", b"\x00")
 WORDS = (b"\x00" * 8, b"\xff" * 8, b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80", b"\x01\x00\x00\x00")
 NUMBER = re.compile(rb"[0-9][0-9.+\-eE]*")
 
 
-def damaged(content, other, random):
+def damaged(content, other, random, snippets):
     data = bytearray(content)
     for _ in range(random.randint(1, 4)):
         # Headers decide what is allocated: half of the changes are made in the first 512 bytes.
         at = random.randint(0, random.choice((len(data), min(len(data), 512))))
         part = slice(at, at + 1 + int(4096 * random.random() ** 4))
-        match random.choice(CHANGES):
+        match random.choice(CHANGES + ("snippet",) * bool(snippets)):
             case "cut":
                 del data[at:]
             case "byte":
@@ -57,6 +65,8 @@ def damaged(content, other, random):
             case "number":
                 if found := NUMBER.search(data, at):
                     data[slice(*found.span())] = random.choice(NUMBERS)
+            case "snippet":
+                data[at:at] = random.choice(snippets)
             case "repeat":
                 data[at:at] = data[part] * random.randint(1, 3)
             case "remove":
@@ -67,77 +77,144 @@ def damaged(content, other, random):
     return bytes(data)
 
 
-def read(source):
-    source.survey()
-    for _ in islice(source.frames(RASTER), 3):
-        pass
+def changed(content, random):
+    """Return a message of the page with other values, of any type, at some of its places."""
+    message = json.loads(content)
+    for _ in range(random.randint(1, 3)):
+        inner = message
+        while True:
+            key = random.choice([*inner])
+            if not isinstance(inner[key], dict) or not inner[key] or random.random() < 0.3:
+                break
+            inner = inner[key]
+        if random.random() < 0.2:
+            del inner[key]
+        else:
+            inner[key] = random.choice(VALUES)
+        if not message or not inner:
+            break
+    return json.dumps(message).encode()
 
 
-def outcome_of(source):
-    """One of `OUTCOMES`: how reading a source in a fork ends."""
+def outcome_of(read, alone):
+    """One of `OUTCOMES`: how reading in a fork ends; alone, the sandbox is this fork."""
     child = os.fork()
     if child:
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         return "hang" if code == -signal.SIGALRM else "crash" if code < 0 else OUTCOMES[code]
-    devnull = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(devnull, 1)
-    os.dup2(devnull, 2)
-    limit_memory(MEMORY)
-    signal.alarm(PATIENCE)
+    devnull = os.open(os.devnull, os.O_RDWR)
+    for number in range(3):
+        os.dup2(devnull, number)
+    if alone:
+        Sandbox.answer = lambda self, function: function()
+        limit_memory(MEMORY)
+        signal.alarm(PATIENCE)
+    else:
+        signal.alarm(1000)
     code = OUTCOMES.index("read")
     try:
-        read(source)
+        read()
     except MemoryError:
         code = OUTCOMES.index("memory")
-    except (SourceError, OSError):
+    except (ValueError, OSError):
         code = OUTCOMES.index("refused")
-    except Exception:
+    except BaseException:
         code = OUTCOMES.index("stumbled")
     os._exit(code)
 
 
-def fuzz(name, contents, cases, folder, escaped):
-    counts, others = Counter(), list(contents.values())
-    source, path = source_of(folder, name), folder / name
-    for number in range(cases):
+def fuzz(contents, chunk):
+    """Return a chunk of cases of one file with their outcomes, and those not contained."""
+    name, first, last = chunk
+    counts, escaped, begin = Counter(), [], perf_counter()
+    target, path = target_of(Path.cwd(), name), Path(name)
+    others, snippets = list(contents.values()), SNIPPETS if name.endswith(".yaml") else ()
+    for number in range(first, last):
         random = Random(f"{name} {number}")
-        path.write_bytes(damaged(contents[name], random.choice(others), random))
-        outcome = outcome_of(source)
+        if name.endswith(".message"):
+            path.write_bytes(changed(contents[name], random))
+        else:
+            path.write_bytes(damaged(contents[name], random.choice(others), random, snippets))
+        outcome = outcome_of(target.alone, alone=True)
         counts[outcome] += 1
         if outcome not in ("read", "refused") and counts[outcome] <= 3:
-            try:
-                with suppress(SourceError, OSError):
-                    read(Isolated(source, name, memory=MEMORY, patience=PATIENCE))
-            except Exception as error:
-                escaped.append(f"{name}: case {number}: {type(error).__name__}: {error}")
+            found = outcome_of(target.product, alone=False)
+            if found not in ("read", "refused"):
+                escaped.append(f"{name}: case {number}: {found}")
         if counts["hang"] == ENOUGH_HANGS:
             break
     path.write_bytes(contents[name])
-    return counts
+    return chunk, [counts[one] for one in OUTCOMES], perf_counter() - begin, escaped
+
+
+def enter_own_folder(folder):
+    own = Path(tempfile.mkdtemp(dir=folder))
+    os.chdir(own)
+    write_targets(own)
+
+
+def noted(log):
+    """Return chunks in a log, with their counts."""
+    if not log or not Path(log).exists():
+        return {}
+    rows = (line.split(",") for line in Path(log).read_text().splitlines())
+    return {(name, int(a), int(b)): list(map(int, counts)) for name, a, b, *counts in rows}
 
 
 def main():
-    given = arguments(__doc__, cases=100_000, only=[])
+    given = arguments(__doc__, cases=100_000, only=[], first=0, processes=1, log="")
+    log = given.log and Path(given.log).resolve()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    escaped, total = [], Counter()
+    escaped, counts, seconds = [], {}, Counter()
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        contents = {name: (folder / name).read_bytes() for name in write_seeds(folder)}
-        kinds = {name: Path(Path(name).parts[0]).suffix for name in contents}
-        chosen = [name for name in contents if not given.only or kinds[name] in given.only]
-        print_head("file", *OUTCOMES, "ms a case")
+        os.chdir(folder)
+        contents = {name: (folder / name).read_bytes() for name in write_targets(folder)}
+        chosen = [name for name in contents if not given.only or kind_of(name) in given.only]
         for name in chosen:
-            read(source_of(folder, name))  # compiles what the forks then have
-            gc.freeze()
-            begin = perf_counter()
-            counts = fuzz(name, contents, -(-given.cases // len(chosen)), folder, escaped)
-            spent = (perf_counter() - begin) / counts.total()
-            total += counts
-            print_row(name, *(str(counts[one]) for one in OUTCOMES), f"{spent * 1e3:.0f}")
-    print_row("all", *(str(total[one]) for one in OUTCOMES), "")
-    print(f"{total.total()} cases, {len(escaped)} that the product does not contain")
+            target_of(folder, name).alone()  # compiles what the forks then have
+        gc.freeze()
+        each = -(-given.cases // len(chosen))
+        last = given.first + each
+        chunks = [
+            (name, at, min(at + CHUNK, last))
+            for at in range(given.first, last, CHUNK)
+            for name in chosen
+        ]
+        before = noted(log)
+        counts |= {chunk: before[chunk] for chunk in chunks if chunk in before}
+        todo = [chunk for chunk in chunks if chunk not in before]
+        make = get_context("fork").Pool
+        with make(given.processes, enter_own_folder, (folder,)) as pool:
+            for chunk, found, taken, wrong in pool.imap_unordered(partial(fuzz, contents), todo):
+                counts[chunk] = found
+                seconds[chunk[0]] += taken
+                escaped += wrong
+                if log:
+                    with log.open("a") as file:
+                        print(*chunk, *found, sep=",", file=file)
+        os.chdir("/")
+    print_table(chosen, counts, seconds)
+    cases = sum(map(sum, counts.values()))
+    print(f"{cases} cases, {len(escaped)} that the product does not contain")
     print(*escaped, sep="\n")
     sys.exit(bool(escaped))
+
+
+def print_table(names, counts, seconds):
+    print_head("file", *OUTCOMES, "ms a case")
+    for name in names:
+        of_name = [found for chunk, found in counts.items() if chunk[0] == name]
+        sums = [sum(column) for column in zip(*of_name, strict=True)]
+        each = f"{1e3 * seconds[name] / max(sum(sums), 1):.0f}"
+        print_row(name, *map(str, sums), each)
+    total = [sum(column) for column in zip(*counts.values(), strict=True)]
+    print_row("all", *map(str, total), "")
+
+
+def kind_of(name):
+    """Return the ending of a file, or of the folder that it is a part of."""
+    return Path(Path(name).parts[0]).suffix
 
 
 if __name__ == "__main__":

@@ -110,7 +110,7 @@ class _Rows:
 
 
 class Readings(NamedTuple):
-    """What `read` returns."""
+    """Result of `read`."""
 
     data: xr.Dataset
     """Readings and lines of all places over the draws, in K, NaN for nothing; images of the
@@ -303,7 +303,7 @@ class _Images:
         self.shown: dict[str, Exposure] = {}
 
     def add(self, instant: int, number: int, chain: ExposedChain) -> None:
-        """Add the images of a surface in an exposure; its noise is that of draw `number`."""
+        """Add the images of a surface in an exposure; its noise belongs to draw `number`."""
         name = list(self.radiances)[number]
         self.radiances[name].append(chain.radiance())
         self.references[name].append(chain.reference())

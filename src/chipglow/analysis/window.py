@@ -95,6 +95,7 @@ class Nominal:
             for name, chain, exposure in zip(local, chains, exposures, strict=True)
         }
         reach, block = camera.integration_time / 2, _block(scene, moment.start)
+        # The frames from half an exposure before to half an exposure after it.
         first, last = (scene.frame_at(begin + at * reach) for at in (-1.0, 3.0))
         frames = scene.frames(range(max(first, block[0]), min(last, block[-1]) + 1))
         return Parts(self, begin, images, tuple(frames))

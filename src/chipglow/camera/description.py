@@ -68,7 +68,8 @@ class CameraSettings(ExposureSettings):
             "Detector with noise, digitiser and calibration; none: an ideal detector.",
             allowed="none, or such as\n"
             "{response: {kind: photon, quantum_efficiency: 0.8, element: 15 um, f_number: 2.5},\n"
-            "full_well: 7e6, bits: 14, terms: [{kind: shot-noise}]}",
+            "full_well: 7e6, bits: 14, terms: [{kind: shot-noise}]};\n"
+            "or the noise of a data sheet alone, at 30 degC: {netd: 20 mK}",
         ),
     ] = None
 

@@ -13,6 +13,7 @@ from chipglow.cli.band import band
 from chipglow.cli.boundary import Boundary
 from chipglow.cli.budget import budget
 from chipglow.cli.camera import calibrate, psf
+from chipglow.cli.cameras import cameras
 from chipglow.cli.chip import rake, shearband
 from chipglow.cli.compare import compare
 from chipglow.cli.correct import correct
@@ -224,6 +225,7 @@ COMMANDS: Final[_Commands] = {
     "show": (show, "measured.nc --plot measured.png"),
     "app": (open_app, "scene.nc"),
     "materials": (materials, "aisi-1045"),
+    "cameras": (cameras, "flir-a6751"),
     "doctor": (doctor, ""),
 }
 

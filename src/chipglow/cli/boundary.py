@@ -24,7 +24,7 @@ _LONGEST_MESSAGE: Final = 2000
 
 _NO_THREAD: Final = "can't start new thread"
 _NO_ROOM: Final = "failed to map segment"
-"""What the system says of a library for which a limit of memory leaves no room."""
+"""Message of the system if a limit of memory leaves no room for a library."""
 
 _FEWER: Final = "end other programs, raise the limit (ulimit -u), or set OMP_NUM_THREADS=1"
 _SMALLER: Final = "choose fewer or coarser samples, or end other programs"

@@ -134,9 +134,10 @@ def correct(
             )
         else:
             measurement, notes, found = _with_tool(measurement, tool)
+            camera, stated = _camera(measurement, Path(str(psf)))
             result = _corrected(
                 measurement,
-                _camera(measurement, Path(str(psf))),
+                camera,
                 named,
                 known,
                 emissivity_uncertainty,
@@ -144,7 +145,7 @@ def correct(
                 outline_uncertainty=found if outline_uncertainty is None else outline_uncertainty,
                 noise=noise,
                 progress=partial(progress, "correction"),
-            ).with_notes(notes)
+            ).with_notes(notes + stated)
     table_of_places = place_frame(result, places_of(result, measurement, named))
     _print(result, table_of_places)
     finish(
@@ -182,35 +183,30 @@ def _frames(measurement: "Measurement", frame: str) -> "Measurement":
 
 def _with_tool(measurement: "Measurement", tool: str | None) -> "tuple[Measurement, Notes, float]":
     """Return the measurement with the chosen tool, and its standard uncertainty in m if found."""
-    import numpy as np
-
     from chipglow.cli.tool_choice import chosen_tool
     from chipglow.text import Notes
 
     if tool is None:
         return measurement, Notes(), 0.0
     chosen, known, notes = chosen_tool(measurement, tool)
-    raster = measurement.raster
-    if (chosen.signed_distance(*np.meshgrid(raster.x, raster.y)) >= 0).all():
-        left, right, bottom, top = (1e6 * edge for edge in raster.extent)
-        raise ValueError(
-            f"--tool: {tool} is outside the image of x {left:.4g} to {right:.4g} um and "
-            f"y {bottom:.4g} to {top:.4g} um; give its place in these coordinates"
-        )
     return measurement.with_tool(chosen), notes, 0.0 if known is None else known.across
 
 
-def _camera(measurement: "Measurement", psf: Path) -> "Camera":
+def _camera(measurement: "Measurement", psf: Path) -> "tuple[Camera, Notes]":
     """Return a camera with the measurement's band and pixels, and a function from a file."""
     from chipglow.camera import Camera, MeasuredPSFFile
+    from chipglow.text import Notes
 
-    band = measurement.band
-    return Camera(
+    choice, band, notes = MeasuredPSFFile(str(psf)), measurement.band, Notes()
+    if choice.psf.band is None:
+        notes = Notes([f"{psf} states no band: it was measured in that of the image."])
+    camera = Camera(
         band=band,
         pitch=measurement.raster.spacing,
         fill_factor=float(measurement.data.attrs.get("fill_factor", 1.0)),
-        psf=MeasuredPSFFile(str(psf)).for_camera(band, None),
+        psf=choice.for_camera(band, None),
     )
+    return camera, notes
 
 
 def _corrected(

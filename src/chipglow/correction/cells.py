@@ -136,8 +136,8 @@ class Parts:
         half as wide as a pixel then err by less than 0.1 K beside an outline.
         """
         row, column = np.divmod(self.cell, self.cells.columns)
-        at_row = (row + _OFFSETS[:, :1]).clip(0, self.cells.rows - 1)
-        at_column = (column + _OFFSETS[:, 1:]).clip(0, self.cells.columns - 1)
+        at_row = _mirrored(row + _OFFSETS[:, :1], self.cells.rows)
+        at_column = _mirrored(column + _OFFSETS[:, 1:], self.cells.columns)
         cells = at_row * self.cells.columns + at_column
         weights = _FROM_MOMENTS @ self._moments_about_centres(x)
         parts = np.tile(np.arange(self.size), len(_OFFSETS))
@@ -188,12 +188,26 @@ class Parts:
         cell = (row + down) * others.cells.columns + column + right
         return replace(self, cells=others.cells, pixels=others.pixels, cell=cell)
 
+    def chosen(self, parts: NDArray[np.intp]) -> "Parts":
+        """Return some of the parts."""
+        names = [field.name for field in fields(self) if field.name not in ("cells", "pixels")]
+        return replace(self, **{name: getattr(self, name)[parts] for name in names})
+
     @cached_property
     def pixel(self) -> NDArray[np.intp]:
         """Index of each part's pixel, in rows from the top."""
         row, column = np.divmod(self.cell, self.cells.columns)
         pixel = row // CELLS_PER_PIXEL * self.pixels.columns + column // CELLS_PER_PIXEL
         return np.asarray(pixel, np.intp)
+
+
+def _mirrored(index: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    """Return indices of 0 to `count` - 1; one beyond an end is as far from it as its mirror image.
+
+    The light of a uniform field is then uniform to the edge of the image.
+    """
+    from_first = np.maximum(index, -1 - index)
+    return np.asarray(np.minimum(from_first, 2 * count - 1 - from_first), np.intp)
 
 
 def cut_cells(observed: ObservedObject, pixels: Raster) -> Parts:

@@ -13,7 +13,15 @@ from chipglow.correction.cells import CELLS_PER_PIXEL
 from chipglow.correction.correct import correct
 from chipglow.correction.correction import Correction, joined
 from chipglow.correction.known import ELSEWHERE, TOOL, KnownPart
-from chipglow.correction.zones import AT_REST, Labels, Motion, ObservedObject, ShapedObject, Zone
+from chipglow.correction.zones import (
+    AT_REST,
+    Labels,
+    Motion,
+    ObservedObject,
+    ShapedObject,
+    Zone,
+    check_tools,
+)
 from chipglow.laboratory.emissivity import EmissivityLine, reflected_temperature
 from chipglow.laboratory.emissivity.temperature import FAR
 from chipglow.quantities import ZERO_CELSIUS, Array
@@ -129,6 +137,7 @@ def correct_known(
         or above 1.
     """
     pixels = measurement.raster
+    check_tools([part.shape for part in parts], pixels)
     lines = [EmissivityLine.constant(1.0) if one.line is None else one.line for one in parts]
     values, slopes = np.stack([line.estimate.values for line in lines]).T
     middles = np.array([line.middle for line in lines])
@@ -193,6 +202,7 @@ def correct_mapped(
             f"emissivity: the map lies at {_extent(image.raster)}, expected the place of the "
             f"measurement, {_extent(pixels)}"
         )
+    check_tools(shapes, pixels)
     sharp = _sharpened(image, camera, shapes, pixels)
 
     def known(kelvins: Array) -> tuple[KnownObject, Notes]:

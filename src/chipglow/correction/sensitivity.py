@@ -45,6 +45,13 @@ than by noise.
 _RESPONSE_TOLERANCE: Final = 1e-2
 """Relative error of the solution's response to a motion, which counts in the second order."""
 
+_CELL_ERROR: Final = 0.003
+"""Standard uncertainty in pixels of an outline by the cells, also of one whose position is exact.
+
+Images by cells half as wide as a pixel err by up to 0.07 K beside an outline, as much as by such a
+displacement.
+"""
+
 _PSF_DRAWS: Final = 6
 """Draws of the point spread function within its uncertainty."""
 
@@ -269,10 +276,14 @@ def fit_outline(posterior: Posterior, known: Knowledge) -> OutlineFit:
     return OutlineFit(Motion(*(motion * scale)), root, Motion(*spread), turn_radius)
 
 
-def outline_effect(posterior: Posterior, known: Knowledge, fit: OutlineFit) -> Effect:
-    """Return the effect of the remaining uncertainty of the outlines' position."""
+def outline_effect(posterior: Posterior, known: Knowledge, fit: OutlineFit | None) -> Effect:
+    """Return the effect of the remaining uncertainty of the outlines' position.
+
+    Without a fit, the position is exact but for the cells.
+    """
     images = np.stack(_motion_images(posterior, known))
-    errors = np.tensordot(fit.root.T, images, axes=1)
+    least = _CELL_ERROR * posterior.problem.parts.pixels.spacing
+    errors = least * images if fit is None else np.tensordot(fit.root.T, images, axes=1)
     return Effect("outline", -posterior.changed_all(list(errors)))
 
 

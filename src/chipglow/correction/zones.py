@@ -1,6 +1,7 @@
 """Zones of the observed object: their emissivity and their outlines."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import astuple, dataclass, replace
 from math import cos, isfinite, sin
 from typing import Final, TypeAlias
@@ -62,6 +63,19 @@ class Zone:
                 raise ValueError(f"zone {self.name}: {name} is {value!r}, expected 0 to below 1")
         if not 0 < self.grain < 1:
             raise ValueError(f"zone {self.name}: grain is {self.grain!r} m, must be above 0 m")
+
+
+def check_tools(shapes: Iterable[Region | Tool | None], pixels: Raster) -> None:
+    """Raise a ValueError if a tool covers no pixel's centre: its place is wrong."""
+    places = np.meshgrid(pixels.x, pixels.y)
+    for tool in shapes:
+        if isinstance(tool, Tool) and not _inside(tool, pixels, *places).any():
+            left, right, bottom, top = (1e6 * edge for edge in pixels.extent)
+            x, y = (1e6 * float(place) for place in tool.tip)
+            raise ValueError(
+                f"tool: its tip at ({x:.4g}, {y:.4g}) um is outside the image, expected a tool "
+                f"that reaches x {left:.4g} to {right:.4g} um and y {bottom:.4g} to {top:.4g} um"
+            )
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,12 @@ CAMERAS: Final[Mapping[str, Mapping[str, Any]]] = read_yaml(_FILE)
 _SAME_PITCH: Final = 1e-6
 """Largest relative difference of two pitches that are the same but for rounding."""
 
+_ABOUT: Final = ("source", "windows", "netd")
+"""What is stated of a camera by name beside fields of the section."""
+
+NEEDED: Final = ("band", "detector_pitch", "frame_rate")
+"""Fields that a study must state if the data sheet does not."""
+
 FROM_DETECTOR: Final = "detector"
 """A lower range limit that follows from the detector."""
 
@@ -46,8 +52,8 @@ class CameraModel(Part):
     preset: Annotated[
         str | None,
         Parameter(
-            "Named camera, whose data sheet supplies the values that this section omits. State the "
-            "magnification of the lens separately.",
+            "Named camera (chipglow cameras), whose data sheet supplies the values that this "
+            "section omits. State the magnification of the lens, or pitch, separately.",
             allowed=f"none, {', '.join(CAMERAS)}",
         ),
     ] = None
@@ -78,7 +84,9 @@ class CameraSection(CameraSettings, CameraModel):
     magnification: Annotated[
         float | None,
         Parameter(
-            "Magnification of the lens: a pitch of 15 um at 2.5 is 6 um on the scene.", over=0.0
+            "Magnification of the lens: a pitch of 15 um at 2.5 is 6 um on the scene. Default with "
+            "detector_pitch and pitch: their ratio.",
+            over=0.0,
         ),
     ] = None
     array: Annotated[
@@ -126,6 +134,8 @@ class CameraSection(CameraSettings, CameraModel):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.detector_pitch is not None:
+            if "pitch" in self.given:
+                self.derive(magnification=self.detector_pitch / self.pitch)
             # A camera by its data sheet: the paper's order would count its footprint twice.
             self.derive(pitch=self._pitch_on_scene(self.detector_pitch), psf_order="optics")
         elif self.magnification is not None and "pitch" in self.given:
@@ -150,13 +160,24 @@ class CameraSection(CameraSettings, CameraModel):
         if name not in list(CAMERAS):  # a mapping or list has no hash
             known = ", ".join(CAMERAS)
             raise ValueError(f"preset: {name!r} is unknown, expected one of {known}")
-        preset = {key: value for key, value in CAMERAS[name].items() if key != "source"}
+        preset = {key: value for key, value in CAMERAS[name].items() if key not in _ABOUT}
+        stated = {**preset, **data}
+        if "pitch" in data:
+            stated.setdefault("detector_pitch", None)
+        for one in NEEDED:
+            if one not in stated:
+                raise ValueError(
+                    f"{one}: not stated by the data sheet of {name} that was found; state it"
+                )
         return {**preset, **data}
 
     def _pitch_on_scene(self, detector_pitch: float) -> float:
         """Return the pitch on the scene that follows from the data sheet."""
         if self.magnification is None:
-            raise ValueError("magnification: must be given with detector_pitch")
+            raise ValueError(
+                "magnification: must be given with detector_pitch, or pitch, the distance of the "
+                "pixels on the scene"
+            )
         pitch = detector_pitch / self.magnification
         if "pitch" in self.given and abs(self.pitch - pitch) > _SAME_PITCH * pitch:
             raise ValueError(

@@ -29,7 +29,10 @@ STEADY: Final = "steady"
 
 @dataclass(frozen=True)
 class FieldOfViewSection(Raster):
-    """Samples of the scene. The tip of the tool is near the origin, y points up."""
+    """Samples of the scene. The tip of the tool is near the origin, y points up.
+
+    By default nine samples along a pixel of 6 µm, over 690 µm × 780 µm about the tip.
+    """
 
     left: float = -650e-6
     top: float = 700e-6

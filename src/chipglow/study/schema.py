@@ -101,7 +101,7 @@ class Study(Part):
 
     @property
     def known(self) -> CorrectionPlan | None:
-        """What a correction knows: uncertainties of emissivity and PSF width, by the budget."""
+        """Knowledge of a correction: uncertainties of emissivity and PSF width, by the budget."""
         if not self.correction:
             return None
         inputs = {one.name: one for one in self.uncertainty.build(self).inputs}

@@ -25,7 +25,7 @@ _LARGEST_WHOLE: Final = 10**300
 """Largest absolute whole number; it is less than the largest double."""
 
 _UNFIT: Final = (LookupError, AttributeError, TypeError, ArithmeticError)
-"""What the loader raises at values such as !!int "" or !!timestamp x."""
+"""Errors that the loader raises for values such as !!int "" or !!timestamp x."""
 
 
 class DescriptionError(ValueError):

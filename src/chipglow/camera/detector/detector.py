@@ -1,9 +1,9 @@
 """The detector: from in-band radiance to electrons and counts, with noise and a limited range."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
-from typing import Annotated, ClassVar, Final, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,13 @@ from chipglow.camera.detector.terms import DETECTOR_TERMS, DetectorTerm, Readout
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.recording import Recording
 from chipglow.quantities import Array, Parameter, Part
+from chipglow.quantities.units import HOTTEST
 
 Correction: TypeAlias = Literal["two-point", "one-point", "none"]
 """Non-uniformity correction: by frames of two flat-field sources, of one, or none."""
+
+NETD, AT = "netd", "netd_temperature"
+"""Keys of the short form: the noise of a data sheet, and the blackbody for which it is stated."""
 
 DARKER_SOURCE: Final = 0.1
 """Fraction of the capacity that the darker source of the correction fills, if none is named."""
@@ -100,6 +104,28 @@ class Detector(Part):
             raise ValueError(
                 f"Detector.hot: {self.hot:g} K, expected more than the {self.cold:g} K of cold"
             )
+
+    @classmethod
+    def completed(cls, data: Any) -> Any:
+        """Return the data, a stated NETD as a term, without limits of range if none is stated."""
+        if not isinstance(data, Mapping) or NETD not in data:
+            return data
+        stated = {key: value for key, value in data.items() if key not in (NETD, AT)}
+        term = {"kind": "netd", "netd": data[NETD]}
+        if AT in data:
+            term["temperature"] = data[AT]
+        if "response" not in stated:
+            stated |= {"response": {"kind": "range", "hottest": f"{HOTTEST:g} K"}, "bits": 32}
+        terms = stated.get("terms", ())
+        if not isinstance(terms, list | tuple):
+            return stated  # which its field refuses
+        return {**stated, "terms": [*terms, term]}
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> Any:
+        section = super().__get_pydantic_json_schema__(schema, handler)
+        short = {"properties": {NETD: {"type": "string"}}, "required": [NETD], "type": "object"}
+        return {"anyOf": [section, short]}
 
     @property
     def conversion_gain(self) -> float:

@@ -1,12 +1,13 @@
 """Point spread functions of an infrared camera."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from errno import ENOENT
 from functools import cached_property
 from math import ceil, inf, log, pi, sqrt
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 import scipy
@@ -44,6 +45,9 @@ FWHM_PER_SIGMA: Final = 2 * sqrt(2 * log(2))
 
 _FAR: Final = 30.0
 """Radius v beyond which the mean irradiance of diffraction rings falls as 1/r³, within 2 %."""
+
+_SAME_LIMIT: Final = 0.01
+"""Accepted relative difference of the limits of two bands: people state two or three digits."""
 
 PSFS: Final = Family("psf")
 """Point spread functions by kind; other packages register theirs in the group ``chipglow.psf``."""
@@ -231,6 +235,9 @@ class MeasuredPSF(PointSpreadFunction):
     includes : tuple of str
         Effects that the measurement contains in addition to the optics: ``footprint`` for the
         sensitive area of a pixel, and kinds of `chipglow.camera.BLURS`.
+    band : Band, optional
+        Spectral band of the measurement. A camera with another one refuses the kernel, as
+        diffraction and focus depend on the wavelength. Unknown by default.
 
     Notes
     -----
@@ -244,6 +251,7 @@ class MeasuredPSF(PointSpreadFunction):
     spacing: float
     components: tuple[Component, ...] = field(default=(), repr=False)
     includes: tuple[str, ...] = ()
+    band: Band | None = None
     fwhm: float = field(init=False)
 
     def __str__(self) -> str:
@@ -262,6 +270,17 @@ class MeasuredPSF(PointSpreadFunction):
     def estimate(self) -> Estimate:
         """`weights` with `components`."""
         return Estimate(self.weights, self.components)
+
+    def for_camera(self, band: Band, magnification: float | None) -> "MeasuredPSF":
+        if self.band is not None and not _is_same(self.band, band):
+            raise ValueError(
+                f"psf: was measured in the band {_limits(self.band)}, expected that of the camera, "
+                f"{_limits(band)}"
+            )
+        return self
+
+    def in_band(self, band: Band) -> "MeasuredPSF":
+        return replace(self, band=None)
 
     @classmethod
     def from_file(
@@ -285,9 +304,8 @@ class MeasuredPSF(PointSpreadFunction):
             )
         try:
             if spacing is None:
-                estimate, spacing, stated = _read_netcdf(path)
-                included = stated if includes is None else includes
-                return cls(estimate.values, spacing, estimate.components, included)
+                psf = _read_netcdf(path)
+                return psf if includes is None else replace(psf, includes=includes)
             return cls(_read_array(path), spacing, includes=includes or ())
         except (ValueError, EOFError, MemoryError, KeyError, RuntimeError) as error:
             raise ValueError(f"psf: {path} is not a kernel: {error}") from error
@@ -410,7 +428,19 @@ class MeasuredPSFFile(PSFChoice):
         object.__setattr__(self, "psf", psf)
 
     def for_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
-        return self.psf
+        try:
+            return self.psf.for_camera(band, magnification)
+        except ValueError as error:
+            raise ValueError(f"{self.file}: {error}") from None
+
+
+def _is_same(band: Band, other: Band) -> bool:
+    limits = (band.lower, other.lower), (band.upper, other.upper)
+    return all(abs(one - two) <= _SAME_LIMIT * two for one, two in limits)
+
+
+def _limits(band: Band) -> str:
+    return f"{WAVELENGTH.text(band.lower)} to {WAVELENGTH.text(band.upper)}"
 
 
 def jinc(v: Array) -> Array:
@@ -455,8 +485,8 @@ def _read_array(path: Path) -> Array:
     return np.asarray(frames[0])
 
 
-def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:
-    """Return kernel with uncertainty components, spacing and `includes`."""
+def _read_netcdf(path: Path) -> MeasuredPSF:
+    """Read a kernel with its uncertainty components, and what is stated of it."""
     if not path.is_file():
         raise FileNotFoundError(ENOENT, "there is no such file", str(path))
     try:
@@ -465,8 +495,17 @@ def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:
         with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as data:
             kernel = data["kernel"].attrs
             stated = tuple(str(kernel.get("includes", "")).split())
-            return from_xarray(data, "kernel"), float(kernel["spacing"]), stated
+            band = _stated_band(kernel)
+            estimate, spacing = from_xarray(data, "kernel"), float(kernel["spacing"])
     except ValueError:
         raise
     except HDF5_ERRORS as error:
         raise ValueError(f"truncated, or not a NetCDF-4 file: {error}") from error
+    return MeasuredPSF(estimate.values, spacing, estimate.components, stated, band)
+
+
+def _stated_band(attributes: Mapping[str, Any]) -> Band | None:
+    """Return the band of a kernel, from its attributes in a file; None if none is stated."""
+    if "band_lower" not in attributes or "band_upper" not in attributes:
+        return None
+    return Band(float(attributes["band_lower"]), float(attributes["band_upper"]))

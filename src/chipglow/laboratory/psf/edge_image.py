@@ -83,8 +83,8 @@ class EdgeImage(Brief):
     """Which pixels have no value, are too bright or are too dark for the camera, shape (y, x)."""
     footprint: float
     """Side of a pixel's sensitive square in m."""
-    wavelength: float | None
-    """Middle of the camera's band in m."""
+    band: Band | None
+    """The camera's band."""
     name: str
     """Its name in messages."""
     unit: str = "W/(m² sr)"
@@ -95,6 +95,11 @@ class EdgeImage(Brief):
     def pitch(self) -> float:
         """Distance between pixels in m."""
         return float(self.x[1] - self.x[0])
+
+    @property
+    def wavelength(self) -> float | None:
+        """Middle of the camera's band in m."""
+        return (self.band.lower + self.band.upper) / 2 if self.band else None
 
     @property
     def usable(self) -> NDArray[np.bool_]:
@@ -205,7 +210,7 @@ def _mean_image(
         (found & Flag.SATURATED) != 0,
         (found & Flag.UNDER_RANGE) != 0,
         raster.spacing * sqrt(fill_factor or 1.0),
-        (band.lower + band.upper) / 2 if band else None,
+        band,
         name,
         notes=notes if fill_factor else notes + Notes([_WHOLE_SQUARE]),
     )

@@ -93,10 +93,13 @@ def write_psf(
     psf = psf_kernel(knife) if psf is None else psf
     data = to_xarray(psf.estimate, "kernel", ("y", "x"))
     data["kernel"].attrs |= {"spacing": psf.spacing, "includes": " ".join(psf.includes)}
+    if psf.band is not None:
+        data["kernel"].attrs |= {"band_lower": psf.band.lower, "band_upper": psf.band.upper}
     data = data.assign_attrs(
         fwhm=knife.fwhm,
         fwhm_uncertainty=knife.fwhm_uncertainty,
         model=knife.best.model.name,
+        pitch=knife.edges[0].image.pitch,
         **knife.notes.attrs(),
     )
     for fit, weight in zip(knife.fits, knife.weights, strict=True):

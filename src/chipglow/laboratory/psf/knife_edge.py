@@ -43,6 +43,7 @@ from chipglow.laboratory.psf.psf_models import (
 )
 from chipglow.laboratory.psf.size_of_source import ApertureImage, aperture_signals
 from chipglow.quantities import Array, Brief
+from chipglow.radiometry import Band
 from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Cause, Component
 from chipglow.uncertainty.estimate import factor
@@ -154,6 +155,12 @@ class KnifeEdge:
     def fwhm_uncertainty(self) -> float:
         """Its standard uncertainty in m."""
         return hypot(self.edge_uncertainty, self.oval * self.fwhm)
+
+    @property
+    def band(self) -> Band | None:
+        """Band of the images; None if they state none or several."""
+        first, *others = (edge.image.band for edge in self.edges)
+        return first if all(band == first for band in others) else None
 
     @property
     def edge_uncertainty(self) -> float:
@@ -439,7 +446,7 @@ def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
     if knife.oval:
         parts[OVAL] = [(kernel(psf, 1 + knife.oval) - kernel(psf, 1 - knife.oval)) / 2]
     components = [_component(name, effects) for name, effects in parts.items() if effects]
-    return MeasuredPSF(middle, spacing, tuple(components))
+    return MeasuredPSF(middle, spacing, tuple(components), band=knife.band)
 
 
 def _within(psf: PointSpreadFunction, reach: float) -> tuple[PointSpreadFunction, float]:

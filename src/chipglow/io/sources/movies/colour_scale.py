@@ -274,7 +274,7 @@ def colour_uncertainty(
     widths = np.interp(values, scale.knots, scale.widths)
     noise = distance * np.interp(values, scale.knots, scale.sensitivity)
     if scale.banded:
-        # 1e-9 of a width is no noise; it prevents a division by zero.
+        # 1e-9 of a width is negligible; it prevents a division by zero.
         wrong = erfc(widths / 2 / np.maximum(noise, 1e-9 * widths) / sqrt(2))
         noise = np.sqrt(wrong) * widths
     colours = np.interp(values, scale.knots, scale.uncertainties)
