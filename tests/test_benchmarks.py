@@ -28,6 +28,7 @@ PROGRAMS = {
         {"rake face": 12, "band": 12, "outline found": 3},
     ),
     "peers/cuqipy_posterior.py": ("--samples 5", {"difference of means": 1, "smallest": 2}),
+    "correction_speed.py": ("--sides 16 20", {"16 x 16": 11, "20 x 20": 11, "exponent": 5}),
     "correction_ranks.py": (
         "--simulations 3 --pixels 8",
         {"| middle of the chip": 4, "| rake face": 4},
@@ -91,6 +92,7 @@ PROGRAMS = {
 NEEDED = {
     "correction.py": ("skimage",),
     "peers/cuqipy_posterior.py": ("cuqi",),
+    "correction_speed.py": ("skimage",),
     "app_latency.py": ("panel", "playwright"),
     "fuzz/fuzz.py": ("hypothesis", "lasso", "panel", "pyvista", "tifffile", "zarr"),
     "movies.py": ("av",),

@@ -8,7 +8,7 @@ from typing import Final
 
 import typer
 from rich.console import Console
-from rich.progress import Progress, TaskID, TimeElapsedColumn
+from rich.progress import Progress, ProgressColumn, TaskID, TimeElapsedColumn
 
 from chipglow.chip import Inertia
 from chipglow.cli.screen import current
@@ -86,7 +86,7 @@ def progress_bars() -> Iterator[Report]:
     console = Console(stderr=True)
     # Where Ctrl-C shows as ^C behind a bar that fills its line, the next bar would be one too low.
     console.width = max(console.width - _MARGIN, _MARGIN)
-    elapsed = "left,", TimeElapsedColumn(), "elapsed"
+    elapsed: tuple[str | ProgressColumn, ...] = "left,", TimeElapsedColumn(), "elapsed"
     columns = *Progress.get_default_columns(), *elapsed
     # Without a terminal only the end is shown: no thread is needed that refreshes the bars.
     with Progress(*columns, console=console, auto_refresh=console.is_terminal) as bars:

@@ -49,8 +49,8 @@ of a twenty-fourth of a pixel: up to 3e-4 of the radiance.
 _OUTLINE_ROUNDS: Final = 8
 """Most rounds in which the outlines move to fit the image."""
 
-_OUTLINE_FOUND: Final = 0.02
-"""Motion of the outlines in pixels below which they stay."""
+_OUTLINE_FOUND: Final = 0.5
+"""Last motion of the outlines in standard uncertainties: the next one would be a tenth of it."""
 
 _BORDER: Final = 3
 """Width in pixels of the border whose values depend on radiance from beyond the image."""
@@ -312,14 +312,13 @@ def _located(
     an outline is wrong, the bends of the radiance that this error causes.
     """
     posterior = _problem(image, camera, known, pixels).smooth(check)
-    fit = fit_outline(posterior, known)
     for _ in range(_OUTLINE_ROUNDS):
-        if not fit.moves(_OUTLINE_FOUND * pixels.spacing):
-            break
+        fit = fit_outline(posterior, known)
         observed = known.observed.moved(_added(known.observed.motion, fit.motion))
         known = replace(known, observed=observed)
+        if not fit.moves(_OUTLINE_FOUND):
+            break
         posterior = _problem(image, camera, known, pixels).smooth(check, posterior)
-        fit = fit_outline(posterior, known)
     return known, fit, posterior
 
 

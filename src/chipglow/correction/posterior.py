@@ -33,11 +33,17 @@ or mean in units of its standard uncertainty. Per pixel it is about the root mea
 the pixels.
 """
 
+_ROUGH_ERROR: Final = 1e-2
+"""The same for solutions from which only weights or positions of outlines follow."""
+
 _STEP_TOLERANCE: Final = 3e-2
 """Error of a step relative to the step at which it suffices: the next one corrects it."""
 
 _DRAW_ERROR: Final = 1e-2
 """Error per pixel of a draw, far below the scatter of a standard deviation from a few draws."""
+
+_ROUND_DRAW_ERROR: Final = 3e-2
+"""The same for draws from which weights of the prior follow, as means of squares."""
 
 _CHANGE_TOLERANCE: Final = 1e-3
 """Relative error of a change by a single error, which may be many standard uncertainties."""
@@ -139,8 +145,9 @@ class Problem:
         A `former` solution, which may be one with other outlines, is the start.
         """
         if former is None:
-            return self._maximum(self._start(), check)
-        return self._maximum(former.problem.parts.continued(former.x, self.parts), check)
+            return self._maximum(self._start(), _ROUGH_ERROR, check)
+        start = former.problem.parts.continued(former.x, self.parts)
+        return self._maximum(start, _ROUGH_ERROR, check)
 
     def solve(
         self,
@@ -154,14 +161,16 @@ class Problem:
         uncertainty (expectation maximisation of the evidence, with a few draws for it).
         """
         posterior = self.smooth(check, former)
-        for _ in range(_ROUNDS):
-            draws = posterior.draws(generator, _DRAWS_PER_ROUND)
+        for remaining in reversed(range(_ROUNDS)):
+            draws = posterior.draws(generator, _DRAWS_PER_ROUND, _ROUND_DRAW_ERROR)
             check()
             uncertain = ((self.curvature.matrix @ draws.T) ** 2).mean(axis=1)
             squares = (self.curvature.matrix @ posterior.x) ** 2 + uncertain
             measured = ~self.image.missing.ravel()[self.parts.pixel]
             self._weigh(self.curvature.variances(squares, self.parts, measured))
-            posterior = self._maximum(self._continued(posterior), check)
+            start = self._continued(posterior)
+            error = _ROUGH_ERROR if remaining else _STEP_ERROR
+            posterior = self._maximum(start, error, check)
         return posterior
 
     def _continued(self, posterior: "Posterior") -> Array:
@@ -182,14 +191,14 @@ class Problem:
         least = 1e-3 * np.abs(np.median(radiance))
         return np.asarray(np.log(np.maximum(radiance, least)))
 
-    def _maximum(self, x: Array, check: Callable[[], None]) -> "Posterior":
-        """Return the most probable solution with the present weights of the prior, nearly."""
+    def _maximum(self, x: Array, error: float, check: Callable[[], None]) -> "Posterior":
+        """Return the most probable solution with the present weights of the prior, to an error."""
         posterior = Posterior(self, x)
         factor = posterior.factor()
         for _ in range(_STEPS):
             check()
             posterior.preconditioner = factor
-            change = posterior.solved(posterior.gradient, _STEP_ERROR, _STEP_TOLERANCE)
+            change = posterior.solved(posterior.gradient, error, _STEP_TOLERANCE)
             if not change.any():
                 break
             change = change.clip(-_LARGEST_STEP, _LARGEST_STEP)
@@ -264,21 +273,23 @@ class Posterior:
         matrix = self.problem.curvature.matrix
         return np.asarray(matrix.T @ (np.sqrt(self.prior_weights) * curvatures))
 
-    def draws(self, generator: np.random.Generator, count: int) -> Array:
+    def draws(
+        self, generator: np.random.Generator, count: int, error: float = _DRAW_ERROR
+    ) -> Array:
         """Return draws of the solution's error (perturbation of data and prior), (draw, part)."""
         responses = [
             self.noise_response(generator) + self.prior_response(generator) for _ in range(count)
         ]
-        return self.drawn_all(responses)
+        return self._solved_all(responses, error)
 
     def drawn_all(self, right_sides: Sequence[Array]) -> Array:
         """Return the changes of the solution for drawn right sides, (draw, part)."""
         return self._solved_all(right_sides, _DRAW_ERROR)
 
-    def changed_all(self, images: Iterable[Array]) -> Array:
+    def changed_all(self, images: Iterable[Array], relative: float = _CHANGE_TOLERANCE) -> Array:
         """Return the changes of the solution with changes of the measured radiance."""
         responses = [self.response(image) for image in images]
-        return self._solved_all(responses, _STEP_ERROR, _CHANGE_TOLERANCE)
+        return self._solved_all(responses, _STEP_ERROR, relative)
 
     def _solved_all(
         self, right_sides: Sequence[Array], error: float, relative: float = 0.0

@@ -42,6 +42,9 @@ The positions of 12 outlines of ``benchmarks/correction.py`` erred by 0.03 pixel
 than by noise.
 """
 
+_RESPONSE_TOLERANCE: Final = 1e-2
+"""Relative error of the solution's response to a motion, which counts in the second order."""
+
 _CELL_ERROR: Final = 0.003
 """Standard uncertainty in pixels of an outline by the cells, also of one whose position is exact.
 
@@ -227,9 +230,16 @@ class OutlineFit:
     """Motions in m (turns at `_turn_radius`) of one standard uncertainty each, (3, direction)."""
     standard_uncertainty: Motion
 
+    turn_radius: float
+    """Distance in m at which `root` states turns."""
+
     def moves(self, least: float) -> bool:
-        """Return whether the outlines move by a length in m or more."""
-        return max(abs(self.motion.right), abs(self.motion.up)) >= least
+        """Return whether the outlines move by `least` standard uncertainties or more.
+
+        Along a straight outline, where nothing shows its position, this is a large motion.
+        """
+        lengths = np.array(astuple(self.motion)) * (1.0, 1.0, self.turn_radius)
+        return bool(np.linalg.norm(np.linalg.solve(self.root, lengths)) >= least)
 
 
 def fit_outline(posterior: Posterior, known: Knowledge) -> OutlineFit:
@@ -240,7 +250,7 @@ def fit_outline(posterior: Posterior, known: Knowledge) -> OutlineFit:
     """
     turn_radius = _turn_radius(posterior.problem.parts)
     images = _motion_images(posterior, known)
-    responses = posterior.changed_all(images)
+    responses = posterior.changed_all(images, _RESPONSE_TOLERANCE)
     weights, gradient = posterior.pixel_weights, posterior.gradient
     unexplained = [
         image - posterior.seen_change(response)
@@ -263,7 +273,7 @@ def fit_outline(posterior: Posterior, known: Knowledge) -> OutlineFit:
     covariance += np.eye(3) * (_OUTLINE_ERROR * posterior.problem.parts.pixels.spacing) ** 2
     spread = np.sqrt(np.diag(covariance)) * scale
     root = np.asarray(np.linalg.cholesky((covariance + covariance.T) / 2), np.float64)
-    return OutlineFit(Motion(*(motion * scale)), root, Motion(*spread))
+    return OutlineFit(Motion(*(motion * scale)), root, Motion(*spread), turn_radius)
 
 
 def outline_effect(posterior: Posterior, known: Knowledge, fit: OutlineFit | None) -> Effect:
