@@ -22,7 +22,7 @@ from chipglow.io.sources.grids.grid import GridSource
 from chipglow.scene import Raster
 
 path = get_sample_data("jacksboro_fault_dem.npz", asfileobj=False)
-source = GridSource(path, {"temperature": "elevation"}, spacing=74.4, row_spacing=92.7)
+source = GridSource(path, names={"temperature": "elevation"}, spacing=74.4, row_spacing=92.7)
 left, right, bottom, top = source.survey().extent
 
 with style():
