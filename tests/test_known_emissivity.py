@@ -34,14 +34,23 @@ CAMERA = Camera(pitch=PITCH, psf=AnnularAperturePSF(), lower_limit=None)
 ROOM = 293.0
 PIXELS = Raster(0.0, COUNT * PITCH, PITCH, COUNT, COUNT)
 FINE = Raster(0.0, COUNT * PITCH, PITCH / SAMPLES, COUNT * SAMPLES, COUNT * SAMPLES)
+MARGIN = 16
+"""Pixels by which a field that varies continues beyond its image on each side."""
+
+BESIDE = MARGIN * PITCH
+AROUND = Raster(
+    -BESIDE, COUNT * PITCH + BESIDE, FINE.spacing, *[(COUNT + 2 * MARGIN) * SAMPLES] * 2
+)
 NOISE = 0.2
 """Noise in K at 600 K."""
 
 
-def seen(emissivity, kelvins, seed=1):
-    """Return the measurement of an object with emissivities on samples, at one temperature."""
+def seen(emissivity, kelvins, seed=1, samples=FINE):
+    """Return the measurement of an object with emissivities and temperatures on samples."""
     light = emissivity * BAND.radiance(kelvins) + (1 - emissivity) * BAND.radiance(ROOM)
-    image = image_formation(CAMERA, FINE).forward(np.broadcast_to(light, FINE.shape))
+    image = image_formation(CAMERA, samples).forward(np.broadcast_to(light, samples.shape))
+    if samples is AROUND:
+        image = image[MARGIN:-MARGIN, MARGIN:-MARGIN]
     noise = np.random.default_rng(seed).normal(0.0, NOISE * float(BAND.slope(600.0)), image.shape)
     return Measurement.from_radiance((image + noise)[None], BAND, np.zeros(1), PIXELS)
 
@@ -88,15 +97,15 @@ def test_the_emissivity_is_taken_at_the_temperature_of_the_pixels():
 
 def test_the_emissivity_follows_the_temperature_within_a_zone():
     line, slope = sloping(), 2e-4
-    kelvins = 700.0 + 300.0 * FINE.x / (COUNT * PITCH)
-    image = seen(0.4 + slope * (kelvins - 700.0), kelvins)
+    kelvins = 700.0 + 300.0 * AROUND.x / (COUNT * PITCH)
+    image = seen(0.4 + slope * (kelvins - 700.0), kelvins, samples=AROUND)
     result = correct_known(
         image, CAMERA, known_parts({"chip": line}, elsewhere="chip"), noise=NOISE
     )
     error = result.data["temperature"][0].values - (700.0 + 300.0 * PIXELS.x / (COUNT * PITCH))
     # The mean emissivity of the zone would be off by up to 6 % and cause 9 K at either end.
-    # Beyond this image, the radiance is that of its edge; the correction continues it: 0.7 K.
-    assert np.abs(error[4:-4, 4:-4].mean(axis=0)).max() < 1.0
+    # Beyond the image the correction lets slopes fade, here they do not: 0.6 to 1.0 K too cold.
+    assert np.abs(error[4:-4, 4:-4].mean(axis=0)).max() < 1.5
 
 
 @pytest.fixture(scope="module")
