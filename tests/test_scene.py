@@ -147,7 +147,10 @@ def changed_field(name, change):
             "'temperature' has type <U7, expected numbers",
         ),
         (lambda: replace(RASTER, spacing=0.0), "Raster.spacing: 0 m, expected 1e-12 m or more"),
-        (lambda: replace(RASTER, spacing=np.nan), "Raster.spacing: nan m, expected 1e-12 m or more"),
+        (
+            lambda: replace(RASTER, spacing=np.nan),
+            "Raster.spacing: nan m, expected 1e-12 m or more",
+        ),
         (lambda: replace(RASTER, rows=0), "Raster.rows: 0, expected 1 to 100000"),
         (lambda: replace(RASTER, left=np.inf), "Raster.left: inf m is not finite"),
         (lambda: Scene.from_fields(RASTER, 0.0, fields()), r"times have shape \(\), expected \(ti"),
