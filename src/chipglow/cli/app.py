@@ -66,8 +66,8 @@ def main() -> None:
 def _ignored(error: "UnraisableHookArgs") -> None:
     """Take an error that Python ignores, as it came in a callback of a library.
 
-    Ctrl-C counts all the same, as soon as the callback has ended; a lack of memory is one line.
-    What an object that Ctrl-C left half made says when it is deleted is not shown.
+    Ctrl-C is repeated as soon as the callback has ended; a lack of memory is one line. Errors of
+    ``__del__`` are not shown: Ctrl-C may have left the object incomplete.
     """
     if issubclass(error.exc_type, KeyboardInterrupt):
         again = threading.Timer(_SOON, _interrupt)

@@ -62,7 +62,7 @@ class Beyond:
         cls, observed: ObservedObject, parts: Parts, formation: ImageFormation, image: Raster
     ) -> "Beyond":
         """Return the continuation of an object beyond an image, and beyond `parts` around it."""
-        outer = cut_cells(observed, _widened(parts.pixels))
+        outer = cut_cells(observed, parts.pixels.widened(_REACH))
         row, column = np.divmod(parts.cell, parts.cells.columns)
         first = CELLS_PER_PIXEL * (parts.pixels.rows - image.rows) // 2
         below, beside = row - first, column - first
@@ -73,28 +73,40 @@ class Beyond:
         inner = solved.chosen(chosen)
         return cls(solved, inner, chosen, outer, replace(formation, samples=outer.cells))
 
-    def excess(self, x: Array, light: Array) -> Array:
-        """Return the image of the light that the continuation adds to constant edges, (y, x).
+    def continuation(self, x: Array) -> Array:
+        """Return the values of the outer parts that minimise curvatures and fading slopes.
 
-        `x` is the logarithm of radiance of the image's parts, `light` that of its cells.
+        `x` is the logarithm of radiance of the parts that are solved for; those in the margin do
+        not count.
+        """
+        values = self._constant(x)
+        unknown = ~self._is_known
+        change = self._factor.solve(-(self._roughness @ values)[unknown])
+        values[unknown] += change.clip(-_LARGEST_CHANGE, _LARGEST_CHANGE)
+        return values
+
+    def excess(self, continuation: Array, light: Array) -> Array:
+        """Return the image of the light that a continuation adds to constant edges, (y, x).
+
+        `light` is that of the cells of the image and its margin.
         """
         reach = CELLS_PER_PIXEL * _REACH
         constant = np.pad(light, reach, mode="edge")
-        return self._seen(self._light(self._continued(x)) - constant, self._outside)
+        return self._seen(self._light(continuation) - constant, self._outside)
 
-    def started(self, x: Array) -> Array:
-        """Return a solution whose values in the margin are those of the continuation."""
+    def with_margin(self, x: Array, continuation: Array) -> Array:
+        """Return a solution whose values in the margin are those of a continuation."""
         index = self.outer.index[self.solved.zone, self.solved.cell // self.outer.cells.columns,
                                  self.solved.cell % self.outer.cells.columns]  # fmt: skip
         margin = index >= 0
         margin[self.chosen] = False
         values = x.copy()
-        values[margin] = self._continued(x)[index[margin]]
+        values[margin] = continuation[index[margin]]
         return values
 
     def errors(self, x: Array) -> list[Array]:
         """Return the changes of the image by one standard uncertainty of each side's light."""
-        slopes = self._light(self._continued(x)) - self._light(self._constant(x))
+        slopes = self._light(self.continuation(x)) - self._light(self._constant(x))
         return [_DOUBT * self._seen(slopes, self._outside & (self._side == side))
                 for side in range(4)]  # fmt: skip
 
@@ -103,14 +115,6 @@ class Beyond:
         own = x[self.chosen]
         values = self.inner.continued(own, self.outer)
         values[self._is_known] = own[self._known]
-        return values
-
-    def _continued(self, x: Array) -> Array:
-        """Return the values of the outer parts that minimise curvatures and fading slopes."""
-        values = self._constant(x)
-        unknown = ~self._is_known
-        change = self._factor.solve(-(self._roughness @ values)[unknown])
-        values[unknown] += change.clip(-_LARGEST_CHANGE, _LARGEST_CHANGE)
         return values
 
     @cached_property
@@ -167,10 +171,3 @@ class Beyond:
 
     def _seen(self, light: Array, chosen: NDArray[np.bool_]) -> Array:
         return self.formation.forward(np.where(chosen, light, 0.0))
-
-
-def _widened(pixels: Raster) -> Raster:
-    """Return the raster with the pixels to which the radiance is continued."""
-    away, more = _REACH * pixels.spacing, 2 * _REACH
-    left, top = pixels.left - away, pixels.top + away
-    return Raster(left, top, pixels.spacing, pixels.rows + more, pixels.columns + more)

@@ -210,10 +210,15 @@ def _mirrored(index: NDArray[np.intp], count: int) -> NDArray[np.intp]:
     return np.asarray(np.minimum(from_first, 2 * count - 1 - from_first), np.intp)
 
 
+def cells_of(pixels: Raster) -> Raster:
+    """Return the cells of pixels."""
+    rows, columns = (CELLS_PER_PIXEL * count for count in pixels.shape)
+    return Raster(pixels.left, pixels.top, pixels.spacing / CELLS_PER_PIXEL, rows, columns)
+
+
 def cut_cells(observed: ObservedObject, pixels: Raster) -> Parts:
     """Cut the cells of an image by the outlines of zones."""
-    rows, columns = (CELLS_PER_PIXEL * count for count in pixels.shape)
-    cells = Raster(pixels.left, pixels.top, pixels.spacing / CELLS_PER_PIXEL, rows, columns)
+    cells = cells_of(pixels)
     points = _looked_up(observed, cells)
     found = [_zone_parts(number, points) for number in range(len(observed.zones))]
     zone = np.repeat(np.arange(len(found)), [one["cell"].size for one in found])

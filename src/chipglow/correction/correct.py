@@ -216,7 +216,7 @@ def _corrected(
 ) -> _Frame:
     """Solve one frame, and propagate the uncertainties."""
     inside, notes = _image(measurement, frame, camera, noise)
-    image, pixels = inside.extended(_MARGIN), _extended(measurement.raster)
+    image, pixels = inside.extended(_MARGIN), measurement.raster.widened(_MARGIN)
     fit, former = None, None
     if known.outline_uncertainty:
         known, fit, former = _located(image, camera, known, pixels, lambda: progress(0.0))
@@ -247,13 +247,6 @@ def _corrected(
         known.observed.motion,
         notes,
     )
-
-
-def _extended(pixels: Raster) -> Raster:
-    """Return the raster with pixels without data around it."""
-    away, more = _MARGIN * pixels.spacing, 2 * _MARGIN
-    left, top = pixels.left - away, pixels.top + away
-    return Raster(left, top, pixels.spacing, pixels.rows + more, pixels.columns + more)
 
 
 def _calibration_images(measurement: Measurement, frame: int) -> list[Array]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from chipglow.camera import Camera, Flag, Measurement
-from chipglow.correction.cells import CELLS_PER_PIXEL
+from chipglow.correction.cells import cells_of
 from chipglow.correction.correct import correct
 from chipglow.correction.correction import Correction, joined
 from chipglow.correction.known import ELSEWHERE, TOOL, KnownPart
@@ -293,12 +293,7 @@ def _sharpened(
         pixels,
     )
     found = correct(measured, camera, outlines, surroundings=_DARK).data.isel(time=0)
-    cells = Raster(
-        raster.left,
-        raster.top,
-        raster.spacing / CELLS_PER_PIXEL,
-        *(CELLS_PER_PIXEL * count for count in raster.shape),
-    )
+    cells = cells_of(raster)
     emissivity = np.asarray(band.radiance(found["fine_temperature"].values.astype(float))) / level
     at_cells, at_pixels = (_labels(outlines, one) for one in (cells, raster))
     spread = _relative_spread(found, band) * emissivity.mean()

@@ -141,6 +141,10 @@ class Problem:
         """Return the mean blackbody radiance of the parts in W/(m² sr)."""
         return np.asarray(np.exp(self.parts.at_centroids @ x))
 
+    def sent(self, x: Array) -> Array:
+        """Return the radiance that the parts send, and its change with its logarithm."""
+        return np.asarray(self.shine * self.radiance(x))
+
     def smooth(self, check: Callable[[], None], former: "Posterior | None" = None) -> "Posterior":
         """Return the solution with the same weights of the prior everywhere.
 
@@ -179,8 +183,10 @@ class Problem:
         """Continue a solution beyond the image, and return it as a start."""
         if self.beyond is None:
             return posterior.x
-        x = self.beyond.started(posterior.x)
-        self.excess = self.beyond.excess(x, Posterior(self, x).light)
+        continuation = self.beyond.continuation(posterior.x)
+        x = self.beyond.with_margin(posterior.x, continuation)
+        light = (self.parts.spread(x) @ self.sent(x)).reshape(self.parts.cells.shape)
+        self.excess = self.beyond.excess(continuation, light)
         return x
 
     def _start(self) -> Array:
@@ -214,8 +220,7 @@ class Posterior:
 
     def __init__(self, problem: Problem, x: Array) -> None:
         self.problem, self.x = problem, x
-        self.sent = problem.shine * problem.radiance(x)
-        """Radiance that the parts send, and its change with its logarithm."""
+        self.sent = problem.sent(x)
         self.spread = problem.parts.spread(x)
         self.predicted = self.seen(self.sent) + problem.reflected + problem.excess
         self.pixel_weights = problem.image.weights(self.predicted)
@@ -343,7 +348,7 @@ class Posterior:
         entries = sent, (parts.pixel, np.arange(parts.size))
         image = sparse.csr_array(entries, shape=(self.pixel_weights.size, parts.size))
         # Pixels without data are seen by others, as far as the blur reaches. Light from beyond the
-        # margin, which continues its edge, reaches all pixels alike and tells them not apart.
+        # margin, which continues its edge, reaches all pixels equally: it does not resolve them.
         within = replace(self.problem.formation, beyond="nothing")
         cells = within.adjoint(np.sqrt(self.pixel_weights)).ravel()
         reach = np.bincount(parts.pixel, parts.area * cells[parts.cell], self.pixel_weights.size)

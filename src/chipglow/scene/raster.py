@@ -68,6 +68,12 @@ class Raster(Part):
         corners = (left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)
         return np.array(corners)
 
+    def widened(self, samples: int) -> "Raster":
+        """Return the raster with a margin of some samples on each side."""
+        away, more = samples * self.spacing, 2 * samples
+        left, top = self.left - away, self.top + away
+        return Raster(left, top, self.spacing, self.rows + more, self.columns + more)
+
     def index(self, points: ArrayLike) -> NDArray[np.float64]:
         """Return fractional row and column of points (..., 2) in m, shape (2, ...)."""
         places = np.asarray(points, dtype=np.float64)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from math import ceil, isfinite, log, sqrt
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,6 +33,16 @@ _SIGMA: Final = 1 / sqrt(8 * log(2))
 
 _STEP: Final = 0.3902
 """Standard deviation of a Gaussian whose integral rises from 10 % to 90 % within 1."""
+
+
+class _Layout(NamedTuple):
+    """Samples and frames of a scene."""
+
+    raster: Raster
+    times: NDArray[np.float64]
+    """Times of the frames in s."""
+    middles: NDArray[np.float64]
+    """Position x of the middle of the band, the step or the spot in each frame, in m."""
 
 
 def band(
@@ -85,7 +95,8 @@ def band(
     def profile(x: NDArray[np.float64]) -> NDArray[np.float64]:
         return gaussian(x, width)
 
-    return _uniform_along_y(profile, width, rise, speed, duration, base, spacing, size)
+    layout = _layout(width, rise, speed, duration, base, spacing, size)
+    return _uniform_along_y(profile, layout, base, rise)
 
 
 def step(
@@ -106,7 +117,8 @@ def step(
     def profile(x: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray((1 - error_function(x / (sqrt(2) * _STEP * width))) / 2)
 
-    return _uniform_along_y(profile, width, rise, speed, duration, base, spacing, size)
+    layout = _layout(width, rise, speed, duration, base, spacing, size)
+    return _uniform_along_y(profile, layout, base, rise)
 
 
 def spot(
@@ -133,18 +145,9 @@ def gaussian(x: ArrayLike, width: float) -> NDArray[np.float64]:
     return np.asarray(np.exp(-0.5 * (np.asarray(x) / (_SIGMA * width)) ** 2))
 
 
-def _uniform_along_y(
-    profile: Profile,
-    width: float,
-    rise: float,
-    speed: float,
-    duration: float,
-    base: float,
-    spacing: float | None,
-    size: tuple[float, float] | None,
-) -> Scene:
+def _uniform_along_y(profile: Profile, layout: _Layout, base: float, rise: float) -> Scene:
     """Return a scene whose rows are all the same: they share the memory of one."""
-    raster, times, middles = _layout(width, rise, speed, duration, base, spacing, size)
+    raster, times, middles = layout
     rows = np.stack([profile(raster.x - middle) for middle in middles]).astype(np.float32)
     kelvins = (np.float32(base) + np.float32(rise) * rows)[:, None, :]
     return _scene(raster, times, np.broadcast_to(kelvins, (len(times), *raster.shape)))
@@ -162,8 +165,8 @@ def _layout(
     base: float,
     spacing: float | None,
     size: tuple[float, float] | None,
-) -> tuple[Raster, NDArray[np.float64], NDArray[np.float64]]:
-    """Return the samples, the times of the frames, and where each frame shows the middle."""
+) -> _Layout:
+    """Return the samples and frames of a scene, after a check of its numbers."""
     for name, value in {"rise": rise, "speed": speed, "base": base}.items():
         if not isfinite(value):
             raise ValueError(f"{name}: {value!r}, expected a finite number")
@@ -187,7 +190,7 @@ def _layout(
     # A frame stands for the time until the next: it shows the middle of that time.
     middles = speed * (times + duration / count / 2 - duration / 2)
     left, top = -spacing * columns / 2, spacing * rows / 2
-    return Raster(left, top, spacing, rows, columns), times, middles
+    return _Layout(Raster(left, top, spacing, rows, columns), times, middles)
 
 
 def _check_positive(name: str, value: float) -> None:

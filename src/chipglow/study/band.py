@@ -386,12 +386,13 @@ def _drawn(
     """Return camera and surface with drawn settings; the nominal one if none of its are drawn."""
     camera, surface = nominal
     try:
+        varied = changed(study, values) if values else study
         if any(name.startswith("camera.") for name in values):
-            camera = _camera(changed(study, values).camera, study.seed)
+            camera = _camera(varied.camera, study.seed)
             if camera.band == nominal[0].band:  # whose tables are computed
                 camera = replace(camera, band=nominal[0].band)
         if any(name.startswith("surface.") for name in values):
-            surface = _surface(changed(study, values), view.scene)
+            surface = _surface(varied, view.scene)
     except ValueError as reason:
         raise ValueError(
             f"uncertainty.inputs: a draw is impossible: {reason}; state a smaller or a bounded "
