@@ -328,9 +328,10 @@ class Controls:
         duration = camera.on(self.raster, state.study.seed).frame_duration(self.raster)
         row = self.rows[EXPOSURE]
         room = 1e6 * (_room(self.scene, state.study.start) - duration + camera.integration_time)
+        longest = row.high if room >= row.high else row.step * floor(room / row.step)
         return {
             "start": list(_starts(self.scene, duration)) or [rounded(1e6 * state.study.start)],
-            EXPOSURE: [row.low, max(min(row.high, row.step * floor(room / row.step)), row.low)],
+            EXPOSURE: [row.low, max(longest, row.low)],
         }
 
     def state_with(self, state: State, texts: Texts) -> State:

@@ -20,6 +20,7 @@ export function render({ view, model, el }) {
   const plotOf = (name) => Bokeh.index.find_one_by_id(named(`${name}_figure`).id);
   const figures = model.get_child("figures");
   spec.figures.forEach((name, i) => find(`#figure-${name}`).prepend(figures[i]));
+  find(".panels").append(...model.get_child("panels"));
   el.style.width = "100%";
   el.append(page);
 
@@ -109,6 +110,8 @@ export function render({ view, model, el }) {
     const cell = down.target.closest?.(".figure");
     if (!cell || down.button !== 0) return;
     const plot = plotOf(cell.id.replace("figure-", "")), figure = plot.model;
+    // A tool that draws or edits, once chosen, has the pointer for itself.
+    if (figure.toolbar.tools.some((one) => one.active && /Draw|Edit|Select/.test(one.type))) return;
     const box = plot.canvas_view.el.getBoundingClientRect();
     const { x_scale, y_scale, bbox } = plot.frame;
     const at = (event) => [x_scale.invert(event.clientX - box.x), y_scale.invert(event.clientY - box.y)];

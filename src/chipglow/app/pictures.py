@@ -39,6 +39,7 @@ from chipglow.scene import Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 from chipglow.study import fit
 from chipglow.surface import Surface
+from chipglow.text import Notes
 
 _Exposed: TypeAlias = tuple[ExposedChain, ExposedChain | None]
 _Result = TypeVar("_Result")
@@ -189,6 +190,32 @@ class Drawn(Brief):
     error: Distribution | None
 
 
+@dataclass(frozen=True, eq=False)
+class SceneFrames:
+    """Frames that the camera of a state makes of a scene, computed when they are asked for."""
+
+    state: State
+    scene: Scene
+    times: Array
+
+    @property
+    def raster(self) -> Raster:
+        """Grid of the pixels."""
+        return self._camera.pixels(self.scene.raster)
+
+    def kelvins(self, index: int) -> Array:
+        """Return the radiance temperature of a frame in K, shape (y, x); NaN out of range."""
+        fitted = fit(self.state.study, self.scene)
+        (surface,) = fitted.surfaces.values()
+        measured = self._camera.measure(fitted.scene, surface, float(self.times[index]))
+        return np.asarray(measured.radiance_temperature()[0])
+
+    @property
+    def _camera(self) -> Camera:
+        study = self.state.study
+        return study.camera.on(self.scene.raster, study.seed)
+
+
 @dataclass(eq=False)
 class SceneModel:
     """A scene, the controls of its study, and pictures; each session has a copy."""
@@ -199,6 +226,7 @@ class SceneModel:
     controls: Controls
     file: str | None  # the scene as a saved study names it; None for the study's cut
     images: ClassVar[tuple[str, ...]] = ("scene", "measured", "error")
+    notes: ClassVar[Notes] = Notes()
     _caches: dict[str, dict[Hashable, Any]] = field(
         init=False, default_factory=lambda: defaultdict(dict), repr=False
     )
@@ -295,6 +323,15 @@ class SceneModel:
         rows, columns = _around_cursor(state, camera.pixels(self.scene.raster))
         window = rows.start, columns.start
         return self._exposure_key(state), camera, state.study.emissivity_uncertainty, window
+
+    def frames(self, state: State) -> SceneFrames:
+        """Return the frames of the state's camera, one for each start that the scene allows."""
+        starts = np.array(self.controls.ranges(state)["start"])
+        return SceneFrames(state, self.scene, 1e-6 * starts)
+
+    def frame(self, state: State) -> int:
+        """Return the index of the frame that begins nearest to the state's start."""
+        return _nearest_time(self.frames(state).times, state)
 
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the numbers at the cursor in K: those of the `error_parts`, and of the scene."""
@@ -486,9 +523,22 @@ class _FramesModel(ABC):
     def times(self) -> Array:
         """Times of the frames in s."""
 
+    @property
+    @abstractmethod
+    def raster(self) -> Raster:
+        """Grid of the pixels."""
+
+    @abstractmethod
+    def kelvins(self, index: int) -> Array:
+        """Return the radiance temperature of a frame in K, shape (y, x); NaN out of range."""
+
+    def frames(self, state: State) -> "_FramesModel":
+        """Return the frames, which do not depend on the state."""
+        return self
+
     def frame(self, state: State) -> int:
-        """Return the frame that began nearest to the state's start."""
-        return int(np.abs(self.times - state.study.start).argmin())
+        """Return the index of the frame that began nearest to the state's start."""
+        return _nearest_time(self.times, state)
 
     def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
         """Return nothing: an error is not known without the truth."""
@@ -514,6 +564,14 @@ class MeasurementModel(_FramesModel):
     @property
     def tool(self) -> Tool | None:
         return self.measurement.tool
+
+    def kelvins(self, index: int) -> Array:
+        return np.asarray(self.measurement.data["radiance_temperature"][index].values, np.float64)
+
+    @property
+    def notes(self) -> Notes:
+        """Assumptions and warnings."""
+        return self.measurement.notes
 
     @property
     def images(self) -> tuple[str, ...]:
@@ -569,6 +627,14 @@ class CorrectionModel(_FramesModel):
     def times(self) -> Array:
         return np.asarray(self.correction.data["time"].values, np.float64)
 
+    def kelvins(self, index: int) -> Array:
+        return np.asarray(self.correction.data["measured"][index].values, np.float64)
+
+    @property
+    def notes(self) -> Notes:
+        """Assumptions and warnings."""
+        return self.correction.notes
+
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
         """Return the frame that began nearest to the state's start."""
         corrected, raster = Corrected(self.correction, frame=self.frame(state)), self.raster
@@ -585,6 +651,10 @@ class CorrectionModel(_FramesModel):
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the measured temperature at the cursor in K."""
         return _at(picture.data, picture.raster, picture.state.cursor)
+
+
+def _nearest_time(times: Array, state: State) -> int:
+    return int(np.abs(times - state.study.start).argmin())
 
 
 Model: TypeAlias = SceneModel | MeasurementModel | CorrectionModel

@@ -24,6 +24,7 @@ from chipglow.analysis.attribution import AttributionReference
 from chipglow.analysis.images import PARTS
 from chipglow.app.controls import CORRECTION, ERROR_IMAGES, Texts
 from chipglow.app.figures import TEXT, Figures
+from chipglow.app.opened import Opened
 from chipglow.app.opening import MOST_UPLOADED, OpenFiles
 from chipglow.app.pictures import Drawn, Model, Picture, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
@@ -39,6 +40,7 @@ class Page(JSComponent):  # type: ignore[misc]
 
     html = param.String()
     figures = Children()
+    panels = Children()
 
     _esm = (_FOLDER / "page.js").read_text(encoding="utf-8")
     _stylesheets: ClassVar[list[str]] = [(_FOLDER / "page.css").read_text(encoding="utf-8")]
@@ -77,6 +79,9 @@ class PageView:
         except ValueError as error:
             self._refused = f"Link: {error}"
         self.figures = Figures(opened.raster, opened.tool, opened.images)
+        images = {name: one.figure for name, one in self.figures.images.items()}
+        model, state = self.session.model, self.session.state
+        self.opened = Opened(opened.name, opened.notes, images, model.frames(state))
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._show_opened = partial(self._send, "open")
@@ -90,6 +95,7 @@ class PageView:
                 pn.pane.Bokeh(one, sizing_mode="fixed", margin=0)
                 for one in self.figures.all.values()
             ],
+            panels=[],
             sizing_mode="stretch_width",
         )
         self.page.on_msg(self._receive)
@@ -229,6 +235,9 @@ class PageView:
     def _show_picture(self, number: int, picture: Picture) -> None:
         self._picture = picture
         self.figures.show(picture)
+        if not picture.quick:
+            model = self.session.model
+            self.opened.show(picture, model.frames(picture.state), model.frame(picture.state))
         self._say(*self._described(picture))
         # The page draws the curves after the images: that halves the time to the images.
         lines = {f"{name}_values": _columns(curves) for name, curves in picture.lines.items()}
