@@ -4,7 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from chipglow.app.pictures import Panel, Picture
+from chipglow.app.pictures import Corrected, Panel, Picture
+from chipglow.camera import Measurement
 from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 from chipglow.scene import Raster
 from chipglow.text import Notes
@@ -66,15 +67,22 @@ class Opened:
     frame: int = field(init=False, default=0)
     """Index of the frame that is shown."""
     images: Mapping[str, ShownImage] = field(init=False, default_factory=dict)
+    measured: Measurement | None = field(init=False, default=None)
+    """The frame that is shown, with its band and flags; None of a correction."""
+    corrected: Corrected | None = field(init=False, default=None)
+    """The frame's correction, if it is shown."""
     _listeners: list[Callable[[], None]] = field(init=False, default_factory=list, repr=False)
 
     def watch(self, listener: Callable[[], None]) -> None:
         """Call a function after each change of `images`, in the thread of the page."""
         self._listeners.append(listener)
 
-    def show(self, picture: Picture, frames: Frames, frame: int) -> None:
-        """Take the images of an exact picture, the index of its frame, and all frames."""
+    def show(
+        self, picture: Picture, frames: Frames, frame: int, measured: Measurement | None
+    ) -> None:
+        """Take the images of an exact picture, all frames, and the index and data of its frame."""
         self.images = {name: ShownImage.of(panel) for name, panel in picture.panels.items()}
         self.frames, self.frame = frames, frame
+        self.measured, self.corrected = measured, picture.corrected
         for listener in self._listeners:
             listener()

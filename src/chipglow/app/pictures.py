@@ -333,6 +333,11 @@ class SceneModel:
         """Return the index of the frame that begins nearest to the state's start."""
         return _nearest_time(self.frames(state).times, state)
 
+    def measured(self, picture: Picture) -> Measurement:
+        """Return what the camera measures in a picture's exposure."""
+        assert picture.camera and picture.exposure
+        return picture.camera.form_measurement(picture.exposure)
+
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the numbers at the cursor in K: those of the `error_parts`, and of the scene."""
         assert picture.camera and picture.exposure and picture.parts
@@ -598,6 +603,11 @@ class MeasurementModel(_FramesModel):
         lines, crossings = _lines(state, raster, data), _crossings(state, measurement.tool)
         return Picture(state, raster, data, panels, lines, crossings, reference=label)
 
+    def measured(self, picture: Picture) -> Measurement:
+        """Return the frame of a picture."""
+        index = self.frame(picture.state)
+        return self.measurement.part(slice(index, index + 1))
+
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the numbers at the cursor in K, with the calibration's uncertainty if known."""
         measurement, index = self.measurement, self.frame(picture.state)
@@ -647,6 +657,9 @@ class CorrectionModel(_FramesModel):
             _lines(state, raster, data), {}, corrected=corrected,
         )  # fmt: skip
         return _with_correction(picture, corrected, self.images)
+
+    def measured(self, picture: Picture) -> None:
+        """Return nothing: a correction states no radiance."""
 
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the measured temperature at the cursor in K."""

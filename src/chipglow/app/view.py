@@ -24,6 +24,7 @@ from chipglow.analysis.attribution import AttributionReference
 from chipglow.analysis.images import PARTS
 from chipglow.app.controls import CORRECTION, ERROR_IMAGES, Texts
 from chipglow.app.figures import TEXT, Figures
+from chipglow.app.measuring import Measuring
 from chipglow.app.opened import Opened
 from chipglow.app.opening import MOST_UPLOADED, OpenFiles
 from chipglow.app.pictures import Drawn, Model, Picture, SceneModel
@@ -82,6 +83,7 @@ class PageView:
         images = {name: one.figure for name, one in self.figures.images.items()}
         model, state = self.session.model, self.session.state
         self.opened = Opened(opened.name, opened.notes, images, model.frames(state))
+        self.measuring = Measuring(self.opened, self._later, self._say)
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._show_opened = partial(self._send, "open")
@@ -95,7 +97,7 @@ class PageView:
                 pn.pane.Bokeh(one, sizing_mode="fixed", margin=0)
                 for one in self.figures.all.values()
             ],
-            panels=[],
+            panels=[self.measuring.panel],
             sizing_mode="stretch_width",
         )
         self.page.on_msg(self._receive)
@@ -110,6 +112,7 @@ class PageView:
     def end(self) -> None:
         """End the work for a page that was closed."""
         self.session.end()
+        self.measuring.end()
         if self._upload is not None:
             self._upload.unlink(missing_ok=True)
 
@@ -131,8 +134,12 @@ class PageView:
             "save": self._on_save,
             "piece": self._on_piece,
             "painted": self.session.painted,
-            "theme": self.figures.set_theme,
+            "theme": self._on_theme,
         }
+
+    def _on_theme(self, theme: str) -> None:
+        self.figures.set_theme(theme)
+        self.measuring.set_theme(theme)
 
     def _act(self, message: dict[str, Any]) -> None:
         self._handled = int(message["n"])
@@ -237,7 +244,9 @@ class PageView:
         self.figures.show(picture)
         if not picture.quick:
             model = self.session.model
-            self.opened.show(picture, model.frames(picture.state), model.frame(picture.state))
+            state = picture.state
+            measured = model.measured(picture)
+            self.opened.show(picture, model.frames(state), model.frame(state), measured)
         self._say(*self._described(picture))
         # The page draws the curves after the images: that halves the time to the images.
         lines = {f"{name}_values": _columns(curves) for name, curves in picture.lines.items()}
