@@ -1,6 +1,6 @@
 """The controls of the app: a table of paths into the study, and the study at their values."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
@@ -51,19 +51,32 @@ ERROR_IMAGES: Final[Mapping[str, str]] = {
 
 ERRORS, CORRECTION = "error", "correction"
 SHOWN_IMAGES: Final[Mapping[str, str]] = {ERRORS: "Scene and error", CORRECTION: "Correction"}
-"""Sets of three images: scene, measured and error; or measured, corrected and one more."""
+"""Sets of images: scene, measured and error; or measured and those of the correction."""
 
 CORRECTION_IMAGES: Final[Mapping[str, str]] = {
-    "half-width": "Half-width (95 %)",
+    "corrected": "Corrected temperature",
+    "half_width": "Half-width (95 %)",
     "true": "True temperature",
-    "error": "Correction error",
+    "error": "Corrected − true",
 }
+"""Titles of the images of a correction, the last two of a scene alone."""
+
+WHOLE: Final = "whole"
+PARTS: Final[Mapping[str, str]] = {
+    "48": "48 × 48 pixels",
+    "96": "96 × 96 pixels",
+    "192": "192 × 192 pixels",
+    WHOLE: "Whole frame",
+}
+"""Parts of a measured frame that are corrected, around the cursor."""
+
+CORRECTING: Final = ("emissivity", "camera.psf", "camera.reflected", "corrected_part")
+"""Beginnings of the paths of controls on which the correction of a measurement depends."""
 
 _ONLY_WITH: Final[Mapping[str, str]] = {
     "scene_image": ERRORS,
     "error_image": ERRORS,
     "analysis.reference": ERRORS,
-    "correction_image": CORRECTION,
     "emissivity_uncertainty": CORRECTION,
 }
 """Controls that have an effect on one kind of images alone."""
@@ -103,7 +116,11 @@ class ShownStudy(Study):
     scene_image: Annotated[str, Parameter("Image of the scene.")] = "temperature"
     error_image: Annotated[str, Parameter("Image of the error.")] = "total"
     images: Annotated[str, Parameter("Kind of images.")] = ERRORS
-    correction_image: Annotated[str, Parameter("Image of the correction.")] = "half-width"
+    emissivity: Annotated[
+        float | None,
+        Parameter("Emissivity of the measured object; none: not known.", over=0.0, most=1.0),
+    ] = None
+    corrected_part: Annotated[str, Parameter("Part of a frame that is corrected.")] = "48"
     emissivity_uncertainty: Annotated[
         float, Parameter("Standard uncertainty of the mean emissivity.", least=0.0, under=1.0)
     ] = 0.01
@@ -198,7 +215,6 @@ TABLE: Final = (
     Control("scene_image", "Scene image", "Scene"),
     Control("error_image", "Error image", "Scene"),
     Control("analysis.reference", "Error against", "Scene"),
-    Control("correction_image", "Third image", "Scene"),
     Control("camera.band.0", "Band from", "Camera", 0.8, 8.0, 0.1),
     Control("camera.band.1", "Band to", "Camera", 1.0, 14.0, 0.1),
     Control("camera.pitch", "Pixel pitch", "Camera", 1.0, 30.0, 0.5),
@@ -229,6 +245,17 @@ TABLE: Final = (
     Control("camera.reflected", "Reflected temperature", "Surface", 0.0, 300.0, 5.0),
 )  # fmt: skip
 """The controls of a column in their order. One is shown while the study has its setting."""
+
+_CORRECTED: Final = (
+    Control("emissivity", "Emissivity", "Correction", 0.05),
+    Control("emissivity_uncertainty", "Uncertainty (k = 1)", "Correction", 0.0, 0.1, 0.005),
+    Control("camera.reflected", "Reflected temperature", "Correction", 0.0, 300.0, 5.0),
+    Control("camera.psf", "PSF", "Correction"),
+    Control("camera.psf.numerical_aperture", "Numerical aperture", "Correction", 0.1, 0.7),
+    Control("camera.psf.fwhm", "PSF width (FWHM)", "Correction", 1.0, 100.0, 0.5),
+    Control("corrected_part", "Part", "Correction"),
+)
+"""The controls of the correction of a measurement."""
 
 PLACES: Final = (
     Control(CURSOR, "Cursor", points=1),
@@ -270,8 +297,6 @@ class Controls:
     def of_scene(cls, study: ShownStudy, scene: Scene, duration: float) -> "Controls":
         """Return the controls of a scene; one exposure lasts `duration`."""
         options = _options(study, scene)
-        words = (word for row in options.values() for word in row.values())
-        studies = [study, *(changed(study, word.changes) for word in words)]
         side = 1e6 * scene.raster.spacing * min(scene.raster.shape)
         exposure = 1e6 * study.camera.integration_time
         ranges: dict[str, dict[str, Any]] = {
@@ -279,22 +304,30 @@ class Controls:
             "camera.pitch": {"high": min(30.0, side)},
             EXPOSURE: {"low": exposure / 10, "high": 5 * exposure, "step": exposure / 20},
         }
-        rows = {}
-        for row in TABLE:
-            declared = [setting_at(one, row.path) for one in studies if _has(one, row.path)]
-            if declared:
-                quantity = declared[0].parameter.quantity
-                own, of_row = ranges.get(row.path, {}), options.get(row.path, {})
-                rows[row.path] = replace(row, quantity=quantity, options=of_row, **own)
+        rows = _declared(TABLE, study, options, ranges)
         return cls(study, rows | {row.path: row for row in PLACES}, scene.raster, scene)
 
     @classmethod
-    def of_measurement(cls, study: Study, times: NDArray[np.float64], raster: Raster) -> "Controls":
-        """Return the controls of a measurement: which of its frames is shown, and the places."""
+    def of_frames(cls, study: Study, times: NDArray[np.float64], raster: Raster) -> "Controls":
+        """Return the controls of frames: which of them is shown, and the places."""
         stops = tuple(rounded(1e6 * one) for one in times)
-        row = replace(TABLE[0], label="Frame began", stops=stops, quantity=INSTANT)
+        row = replace(TABLE[0], label="Frame began", group="Frame", stops=stops, quantity=INSTANT)
         rows = {row.path: row for row in (row, *PLACES)}
-        return cls(shown_study(study, start=rounded(times[0])), rows, raster)
+        return cls(shown_study(study, images=CORRECTION, start=rounded(times[0])), rows, raster)
+
+    @classmethod
+    def of_measurement(cls, study: Study, times: NDArray[np.float64], raster: Raster) -> "Controls":
+        """Return the controls of a measurement: those of its frames and of their correction."""
+        study = changed(study, {"camera.psf": "none", "camera.blur": ()})
+        frames = cls.of_frames(study, times, raster)
+        options = {
+            "camera.psf": _first("none", _psfs("Not stated")),
+            "corrected_part": {
+                part: Option(label, {"corrected_part": part}) for part, label in PARTS.items()
+            },
+        }
+        rows = _declared(_CORRECTED, frames.study, options, {})
+        return replace(frames, rows={**frames.rows, **rows})
 
     @cached_property
     def initial(self) -> State:
@@ -413,17 +446,39 @@ def _has(study: Study, path: str) -> bool:
     return False
 
 
-def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
-    """Return the words of the controls that have some, the study's own one first."""
-    camera, psf = study.camera, study.camera.psf
-    limit = {"camera.lower_limit": camera.build().lower_limit}
-    psfs = {
+def _declared(
+    table: Iterable[Control],
+    study: Study,
+    options: Mapping[str, Mapping[str, Option]],
+    ranges: Mapping[str, dict[str, Any]],
+) -> dict[str, Control]:
+    """Return the controls whose setting the study has, or has with one of the options."""
+    words = (word for row in options.values() for word in row.values())
+    studies = [study, *(changed(study, word.changes) for word in words)]
+    rows = {}
+    for row in table:
+        declared = [setting_at(one, row.path) for one in studies if _has(one, row.path)]
+        if declared:
+            own, of_row = ranges.get(row.path, {}), options.get(row.path, {})
+            quantity = declared[0].parameter.quantity
+            rows[row.path] = replace(row, quantity=quantity, options=of_row, **own)
+    return rows
+
+
+def _psfs(none: str) -> dict[str, Option]:
+    return {
         "annular-aperture": Option(
             "Annular aperture", {"camera.psf": {"kind": "annular-aperture"}}
         ),
         "gaussian": Option("Gaussian", {"camera.psf": {"kind": "gaussian", "fwhm": "8 um"}}),
-        "none": Option("None (ideal)", {"camera.psf": "none", "camera.blur": ()}),
+        "none": Option(none, {"camera.psf": "none", "camera.blur": ()}),
     }
+
+
+def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
+    """Return the words of the controls that have some, the study's own one first."""
+    camera, psf = study.camera, study.camera.psf
+    limit = {"camera.lower_limit": camera.build().lower_limit}
     detectors = {
         "none": Option("None", {"camera.detector": "none", **limit}),
         "noise": Option("Noise", {"camera.detector": _NOISE, **limit}),
@@ -435,12 +490,11 @@ def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
         "scene_image": scene_images,
         "error_image": ERROR_IMAGES,
         "images": SHOWN_IMAGES,
-        "correction_image": CORRECTION_IMAGES,
         "analysis.reference": REFERENCES,
         "camera.psf_order": {"detector": "Blur on the pixels", "optics": "Blur on the scene"},
     }
     options = {
-        "camera.psf": _first("none" if psf is None else psf.kind, psfs),
+        "camera.psf": _first("none" if psf is None else psf.kind, _psfs("None (ideal)")),
         "camera.detector": _first(AS_STUDY if camera.detector else "none", detectors),
         "surface": _surfaces(study),
     }

@@ -37,7 +37,8 @@ TITLES: Final = {
     "measured": "Measured radiance temperature / °C",
     "error": "Error / K",
     "corrected": "Corrected temperature / °C",
-    "half_width": f"{CORRECTION_IMAGES['half-width']} / K",
+    "half_width": f"{CORRECTION_IMAGES['half_width']} / K",
+    "true": "True temperature / °C",
 }
 
 TEXT: Final = {"light": "#16191d", "dark": "#e8eaed"}

@@ -9,7 +9,7 @@ import numpy as np
 from chipglow.laboratory.emissivity import EmissivityLine, PlacesDescription
 from chipglow.laboratory.emissivity.places import KnownEmissivity
 from chipglow.quantities import Array
-from chipglow.quantities.units import POSITION
+from chipglow.quantities.units import KELVINS, POSITION
 from chipglow.scene import Circle, Pixel, Polygon, Polyline, Raster, Region
 from chipglow.scene.regions import Point
 from chipglow.text.template import yaml_line
@@ -173,9 +173,9 @@ def _drawn(place: Region, raster: Raster) -> tuple[Kind, tuple[Point, ...]]:
 
 
 def places_text(
-    marks: Sequence[Mark], file: str, reflected: tuple[str, str], view: dict[str, Any]
+    marks: Sequence[Mark], file: str, reflected: float | None, view: dict[str, Any]
 ) -> str:
-    """Return the file of places as YAML; `reflected` is temperature and standard uncertainty."""
+    """Return the file of places as YAML; `reflected` is the surroundings' temperature in K."""
     sections: dict[str, dict[str, Any]] = {"regions": {}, "points": {}, "lines": {}}
     for mark in marks:
         key, value = mark.entry()
@@ -190,6 +190,7 @@ def places_text(
         if entries:
             lines.append(f"{key}:")
             lines += [f"  {yaml_line(name)}: {yaml_line(one)}" for name, one in entries.items()]
-    lines += [f"reflected: {reflected[0]}", f"reflected_uncertainty: {reflected[1]}"]
+    if reflected is not None:
+        lines.append(f"reflected: {KELVINS.text(reflected)}")
     lines.append(f"view: {yaml_line(view)}")
     return "\n".join(lines) + "\n"

@@ -33,7 +33,7 @@ from chipglow.laboratory.emissivity import PlacesDescription, reflected_temperat
 from chipglow.laboratory.emissivity.places import ImageView, KnownEmissivity, Palette
 from chipglow.laboratory.readings import PlaceCurves
 from chipglow.quantities import ZERO_CELSIUS
-from chipglow.quantities.units import KELVINS, TEMPERATURE
+from chipglow.quantities.units import TEMPERATURE
 from chipglow.scene.regions import Point
 
 _COLOURS: Final[Mapping[str, Any]] = {
@@ -62,6 +62,23 @@ _COLUMNS: Final = {
 }
 """Columns of the table on the page with their titles."""
 
+_HINTS: Final[Mapping[str, str]] = {
+    "cursor": "Choose a shape above the images and draw it.",
+    "point": "Point: click on an image.",
+    "line": "Line: drag from end to end.",
+    "box": "Box: drag from corner to corner.",
+    "circle": "Circle: drag from the centre to the rim.",
+    "polygon": "Polygon: click each corner, then press Enter; on a touch screen hold the last one.",
+    "edit": "Edit: drag a handle, or click it and press Backspace to remove its place.",
+}
+
+_GRID: Final = {
+    "display": "grid",
+    "grid-template-columns": "repeat(auto-fit, minmax(280px, 1fr))",
+    "width": "100%",
+}
+"""Figures side by side, as many as fit."""
+
 _LINE_HEIGHT: Final = 190
 """Height of the curves in pixels."""
 
@@ -84,7 +101,9 @@ class Measuring:
         self._reader = Reader(opened)
         self._curves: PlaceCurves | None = None
         self._table = pd.DataFrame()
-        self._drawn = DrawnPlaces(opened.figures, self._add, self._move, self._remove)
+        self._drawn = DrawnPlaces(
+            opened.figures, self._add, self._move, self._remove, self._hint_at
+        )
         self._work = Newest(self._read_curves, self._failed)
         self._build()
         opened.watch(self._refresh)
@@ -107,12 +126,13 @@ class Measuring:
         ):
             widget.value = None if kelvins is None else round(kelvins - ZERO_CELSIUS, 6)
         self._palette.value = view.palette
-        self._reflected.value = round(described.reflected - ZERO_CELSIUS, 6)
-        self._reflected_uncertainty.value = described.reflected_uncertainty
 
     def end(self) -> None:
         """Stop reading for a page that was closed."""
         self._work.cancel()
+
+    def _hint_at(self, tool: str) -> None:
+        self._hint.object = _HINTS[tool]
 
     # Places
 
@@ -180,9 +200,8 @@ class Measuring:
         self._ask_curves()
 
     def _show_table(self) -> None:
-        surroundings = reflected_temperature(
-            (self._reflected.value or 0.0) + ZERO_CELSIUS, self._reflected_uncertainty.value or 0.0
-        )
+        reflected = self._opened.reflected
+        surroundings = None if reflected is None else reflected_temperature(reflected)
         readings = [self._reader.read(mark, surroundings) for mark in self._marks]
         self._table = table_of(readings)
         rows = self._table.reindex(columns=[*_COLUMNS]).assign(
@@ -193,7 +212,6 @@ class Measuring:
         )
         self._rows.value = rows
         self._rows.visible = bool(self._marks)
-        self._hint.visible = not self._marks
         self._copied.data = {"text": [self._table.to_csv(sep="\t", index=False)]}
         warnings = [warning for one in readings for warning in one.notes.warnings]
         self._warnings.object = "\n\n".join(warnings)
@@ -337,10 +355,7 @@ class Measuring:
         for name in ("low", "high", "isotherm"):
             if (kelvins := getattr(self._view, name)) is not None:
                 view[name] = TEMPERATURE.text(round(kelvins, 6))
-        kelvins = (self._reflected.value or 0.0) + ZERO_CELSIUS
-        reflected = KELVINS.text(round(kelvins, 6))
-        uncertainty = f"{self._reflected_uncertainty.value or 0.0:g} K"
-        return places_text(self._marks, self._opened.name, (reflected, uncertainty), view)
+        return places_text(self._marks, self._opened.name, self._opened.reflected, view)
 
     def _picture(self) -> bytes:
         celsius = self._reader.kelvins - ZERO_CELSIUS
@@ -358,7 +373,7 @@ class Measuring:
         self._rows.on_edit(self._on_edit)
         self._rows.on_click(lambda event: self._remove(event.row), column="delete")
         self._rows.param.watch(self._show_histogram, "selection")
-        self._hint = pn.pane.HTML("Choose a shape above and draw it on an image.")
+        self._hint = pn.pane.HTML(_HINTS["cursor"], margin=2)
         self._warnings = pn.pane.Markdown("", visible=False)
         self._low = _number("Colours from / °C")
         self._high = _number("to / °C")
@@ -369,28 +384,20 @@ class Measuring:
         )
         for widget in (self._low, self._high, self._isotherm, self._palette):
             widget.param.watch(self._on_view, "value")
-        self._reflected = _number("Reflected / °C", reflected_celsius())
-        self._reflected_uncertainty = _number("its u / K", 0.0)
-        for widget in (self._reflected, self._reflected_uncertainty):
-            widget.param.watch(self._refresh, "value")
         self._copied = ColumnDataSource({"text": [""]})
         self._profiles: dict[str, pd.DataFrame] = {}
         self._counted = pd.DataFrame()
         self._build_figures()
+        self.tools = pn.pane.Bokeh(self._drawn.choice, margin=0)
         self.panel = pn.Column(
-            self._drawn.choice,
-            pn.FlexBox(
-                self._low, self._high, self._palette, self._isotherm,
-                self._reflected, self._reflected_uncertainty,
-            ),
             self._hint,
             self._rows,
             self._warnings,
-            pn.FlexBox(*(_pane(one) for one in self._figures)),
+            pn.Column(*(_pane(one) for one in self._figures), styles=_GRID),
+            pn.FlexBox(self._low, self._high, self._palette, self._isotherm),
             pn.FlexBox(*self._buttons()),
             sizing_mode="stretch_width",
-            css_classes=["measuring"],
-        )  # fmt: skip
+        )
 
     def _build_figures(self) -> None:
         empty: dict[str, list[Any]] = {"xs": [], "ys": [], "colour": [], "name": []}
@@ -429,11 +436,6 @@ class Measuring:
     def _curves_file(self) -> bytes:
         tables = {name: one for name, one in self._tables().items() if name != "places"}
         return b"\r\n".join(f"{name}\r\n".encode() + csv_file(one) for name, one in tables.items())
-
-
-def reflected_celsius() -> float:
-    """Return the temperature of the reflected surroundings by default in °C."""
-    return round(float(reflected_temperature().values) - ZERO_CELSIUS, 6)
 
 
 def _mapper(one: Any) -> LinearColorMapper:
@@ -493,7 +495,7 @@ def _curves(title: str, x: str, source: ColumnDataSource) -> Any:
 
 
 def _pane(one: Any) -> Any:
-    return pn.pane.Bokeh(one, styles={"flex": "1 1 300px"}, min_width=280, margin=2)
+    return pn.pane.Bokeh(one, sizing_mode="stretch_width", margin=2)
 
 
 def _download(label: str, filename: str, make: Callable[[], bytes]) -> Any:

@@ -71,6 +71,8 @@ class Opened:
     """The frame that is shown, with its band and flags; None of a correction."""
     corrected: Corrected | None = field(init=False, default=None)
     """The frame's correction, if it is shown."""
+    reflected: float | None = field(init=False, default=None)
+    """Temperature of the reflected surroundings in K, if the page states it."""
     _listeners: list[Callable[[], None]] = field(init=False, default_factory=list, repr=False)
 
     def watch(self, listener: Callable[[], None]) -> None:
@@ -84,5 +86,6 @@ class Opened:
         self.images = {name: ShownImage.of(panel) for name, panel in picture.panels.items()}
         self.frames, self.frame = frames, frame
         self.measured, self.corrected = measured, picture.corrected
+        self.reflected = picture.state.study.camera.reflected
         for listener in self._listeners:
             listener()

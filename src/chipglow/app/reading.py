@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from chipglow.app.marks import Mark
 from chipglow.app.opened import Opened
+from chipglow.camera import Measurement
 from chipglow.laboratory.readings import (
     Histogram,
     PlaceCurves,
@@ -22,6 +23,7 @@ from chipglow.laboratory.readings import (
     statistics,
 )
 from chipglow.quantities import Array
+from chipglow.radiometry import Band
 from chipglow.scene import Raster, Region
 from chipglow.text import Notes
 from chipglow.uncertainty import Estimate
@@ -39,6 +41,7 @@ class Reader:
     def __init__(self, opened: Opened) -> None:
         self._opened = opened
         self._masks: dict[tuple[Region, Raster], NDArray[np.bool_]] = {}
+        self._band: Band | None = None
 
     @property
     def is_ready(self) -> bool:
@@ -80,6 +83,7 @@ class Reader:
         corrected = self._corrected(place)
         line = None if corrected is not None else mark.line
         if measured is not None:
+            self._share_band(measured)
             reading = read_place(measured, place, mask, line, surroundings)
         else:
             flagged = np.isnan(self.kelvins)
@@ -87,6 +91,14 @@ class Reader:
         if corrected is None:
             return reading
         return PlaceReading(place, reading.statistics, true=corrected)
+
+    def _share_band(self, measured: Measurement) -> None:
+        """Let a frame have the band of the last one: its tables are computed once."""
+        if "band_lower" not in measured.data.attrs:
+            return
+        if self._band != measured.band:
+            self._band = measured.band
+        measured.band = self._band
 
     def _corrected(self, place: Region) -> Estimate | None:
         """Return the mean true temperature of a place in K by the correction that is shown."""

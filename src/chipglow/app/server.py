@@ -10,7 +10,8 @@ import panel as pn
 from bokeh.server.auth_provider import AuthProvider
 from tornado.web import RequestHandler
 
-from chipglow.app.opening import OpenFiles
+from chipglow.app.asking_page import AskingPage
+from chipglow.app.opening import Asking, OpenFiles
 from chipglow.app.pictures import Model
 from chipglow.app.view import PageView
 
@@ -50,7 +51,7 @@ class TokenAuth(AuthProvider):  # type: ignore[misc]
 class App:
     """The running app; port 0 means any that is free."""
 
-    def __init__(self, first: Model, address: str = LOCAL, port: int = 0) -> None:
+    def __init__(self, first: Model | Asking, address: str = LOCAL, port: int = 0) -> None:
         port = _free_port(address, port)
         self.files = OpenFiles(first)
         auth = TokenAuth()
@@ -96,6 +97,10 @@ class App:
         opened = self.files.find(key)
         if opened is None:
             return pn.pane.HTML("<p>This file is no longer open: open it again.</p>")
+        if isinstance(opened, Asking):
+            asking = AskingPage(opened, key, self.files)
+            asking.start(pn.state.curdoc)
+            return asking.page
         view = PageView(opened, given, {OPEN: key} if key else {}, self.files)
         view.start(pn.state.curdoc)
         pn.state.on_session_destroyed(lambda _: view.end())

@@ -38,7 +38,8 @@ class DrawnPlaces:
     """The outlines of places on all images, and the tools that draw and edit them.
 
     `drawn` takes the kind and the points of a new place, `moved` the index of a place, that of its
-    handle and where it is now, `removed` the index of a place; points are in m.
+    handle and where it is now, `removed` the index of a place, `chosen` the name of a tool; points
+    are in m.
     """
 
     def __init__(
@@ -47,6 +48,7 @@ class DrawnPlaces:
         drawn: Callable[[Kind, tuple[Point, ...]], None],
         moved: Callable[[int, int, Point], None],
         removed: Callable[[int], None],
+        chosen: Callable[[str], None],
     ) -> None:
         self._drawn, self._moved, self._removed = drawn, moved, removed
         self._outlines = ColumnDataSource({"xs": [], "ys": [], "colour": []}, name="outlines")
@@ -70,6 +72,7 @@ class DrawnPlaces:
         self._strokes.on_change("data", self._on_stroke)
         labels = [name.capitalize() for name in (_CURSOR, *_KINDS, _EDIT)]
         self.choice = RadioButtonGroup(labels=labels, active=0, stylesheets=[_BUTTONS])
+        self.choice.on_change("active", lambda attr, old, new: chosen(self._kind))
         self.choice.js_on_change("active", CustomJS(args={"groups": groups}, code=_ACTIVATE))
 
     def show(self, marks: Sequence[Mark]) -> None:

@@ -6,7 +6,7 @@ from base64 import b64encode
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
-from math import isfinite
+from math import hypot, isfinite
 from pathlib import Path
 from threading import RLock
 from time import perf_counter
@@ -17,12 +17,12 @@ import panel as pn
 import param
 from bokeh.document import Document
 from jinja2 import Environment, PackageLoader
-from panel.custom import Children, JSComponent
+from panel.custom import Child, Children, JSComponent
 
 from chipglow import __version__
 from chipglow.analysis.attribution import AttributionReference
 from chipglow.analysis.images import PARTS
-from chipglow.app.controls import CORRECTION, ERROR_IMAGES, Texts
+from chipglow.app.controls import CORRECTION, ERROR_IMAGES, WHOLE, Texts
 from chipglow.app.figures import TEXT, Figures
 from chipglow.app.measuring import Measuring
 from chipglow.app.opened import Opened
@@ -33,6 +33,9 @@ from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.quantities.format import quantity_text, readable, rounded_text, uncertain_decimals
 
 _FOLDER: Final = Path(__file__).parent
+_SHOWN_SOURCES: Final = 3
+"""Sources of uncertainty at the cursor that have a bar of their own."""
+
 _log = logging.getLogger(__name__)
 
 
@@ -42,6 +45,8 @@ class Page(JSComponent):  # type: ignore[misc]
     html = param.String()
     figures = Children()
     panels = Children()
+    tools = Child()
+    dropper = Child()
 
     _esm = (_FOLDER / "page.js").read_text(encoding="utf-8")
     _stylesheets: ClassVar[list[str]] = [(_FOLDER / "page.css").read_text(encoding="utf-8")]
@@ -71,7 +76,6 @@ class PageView:
         embedded: bool = False,
     ) -> None:
         self._link, self._files = link or {}, files
-        self._upload: Path | None = None
         self._uploads = Newest(self._open, self._notified)
         self.session = Session(opened, self._notified)
         self._refused = ""
@@ -98,6 +102,8 @@ class PageView:
                 for one in self.figures.all.values()
             ],
             panels=[self.measuring.panel],
+            tools=self.measuring.tools,
+            dropper=self._dropper() if files is not None else None,
             sizing_mode="stretch_width",
         )
         self.page.on_msg(self._receive)
@@ -113,8 +119,15 @@ class PageView:
         """End the work for a page that was closed."""
         self.session.end()
         self.measuring.end()
-        if self._upload is not None:
-            self._upload.unlink(missing_ok=True)
+
+    def _dropper(self) -> pn.widgets.FileDropper:
+        """Return where files are dropped."""
+        dropper = pn.widgets.FileDropper(
+            max_file_size=f"{MOST_UPLOADED // 1024**2}MB", layout="compact", previews=[],
+            width=230, margin=0,
+        )  # fmt: skip
+        dropper.param.watch(lambda event: self._on_dropped(event.new), "value")
+        return dropper
 
     # Messages of the page
 
@@ -132,7 +145,6 @@ class PageView:
             "cancel": self._on_cancel,
             "chip": self._on_chip,
             "save": self._on_save,
-            "piece": self._on_piece,
             "painted": self.session.painted,
             "theme": self._on_theme,
         }
@@ -187,7 +199,7 @@ class PageView:
 
     def _on_cancel(self, _: None) -> None:
         self.session.cancel()
-        self._say("The drawing was cancelled.")
+        self._say("The computation was cancelled.")
 
     def _on_chip(self, theme: str) -> None:
         from chipglow.app.files import chip_picture  # Matplotlib takes long to import
@@ -211,31 +223,16 @@ class PageView:
         self._send("download", {"name": name, "url": url})
         self._say(f"{name} is saved.")
 
-    def _on_piece(self, piece: dict[str, Any]) -> None:
-        """Append a piece of an uploaded file; the last one opens it."""
-        assert self._files is not None
-        if self._upload is None or piece["first"]:
-            self._upload = self._files.new_path()
-        with self._upload.open("ab") as file:
-            file.write(piece["data"])
-            size = file.tell()
-        if size > MOST_UPLOADED:
-            self._upload.unlink()
-        elif piece["last"]:
-            self._uploads.ask((self._upload, piece["name"]))
-            self._upload = None
-        else:
-            self._send("more", None)
+    def _on_dropped(self, files: Mapping[str, bytes | str]) -> None:
+        """Open the file that was dropped; the browser then loads its page."""
+        for name, content in files.items():
+            self._say(f"Opening {name}.", "busy", progress=None)
+            data = content.encode() if isinstance(content, str) else content
+            self._uploads.ask((name, data))
 
-    def _open(self, upload: tuple[Path, str]) -> None:
-        path, name = upload
+    def _open(self, upload: tuple[str, bytes]) -> None:
         assert self._files is not None
-        try:
-            key = self._files.add(path, name)
-        except (ValueError, OSError):
-            path.unlink(missing_ok=True)
-            raise
-        self._notified("opened", key)
+        self._notified("opened", self._files.add(*upload))
 
     # Messages to the page
 
@@ -245,12 +242,13 @@ class PageView:
         if not picture.quick:
             model = self.session.model
             state = picture.state
-            measured = model.measured(picture)
+            measured = model.measurement_of(picture)
             self.opened.show(picture, model.frames(state), model.frame(state), measured)
         self._say(*self._described(picture))
         # The page draws the curves after the images: that halves the time to the images.
         lines = {f"{name}_values": _columns(curves) for name, curves in picture.lines.items()}
         content = {"number": number, "lines": lines, "absent": picture.absent}
+        content["images"] = list(picture.panels)
         self._send("picture", content | {"quick": picture.quick})
 
     def _described(self, picture: Picture) -> tuple[str, str]:
@@ -290,6 +288,7 @@ class PageView:
         parts = {name: numbers[name] for name in (*PARTS, "texture") if name in numbers}
         template = _TEMPLATES.get_template("numbers.html")
         corrected = picture.corrected and picture.corrected.at(picture.state.cursor)
+        largest = _largest(corrected.contributions) if corrected else {}
         html = template.render(
             numbers=numbers,
             texts=_texts(numbers),
@@ -303,14 +302,19 @@ class PageView:
             is_correction=picture.state.study.images == CORRECTION,
             is_corrected=picture.corrected is not None,
             corrected=corrected,
-            shares=_bars(corrected.contributions if corrected else {}),
+            largest=largest,
+            shares=_bars(largest),
+            needs=self.session.model.needs(picture.state),
         )
         self._send("numbers", html)
 
-    def _show_correcting(self) -> None:
-        self._say(
-            "Correcting the pixels around the cursor; this takes seconds.", "busy", progress=None
-        )
+    def _show_correcting(self, done: float) -> None:
+        part = self.session.state.study.corrected_part
+        pixels = "the whole frame" if part == WHOLE else "the pixels around the cursor"
+        self._say(f"Correcting {pixels}.", "busy", progress=done or None)
+
+    def _show_needs(self, needs: str) -> None:
+        self._say(f"Measured image. Set {needs} to correct it.")
 
     def _show_drawn(self, drawn: Drawn) -> None:
         if drawn.state != self.session.state or self._picture is None:
@@ -378,6 +382,13 @@ def _columns(curves: Mapping[str, Array]) -> dict[str, list[float]]:
     return {key: curve.tolist() for key, curve in drawn.items() if key not in ("low", "high")}
 
 
+def _largest(contributions: Mapping[str, float]) -> dict[str, float]:
+    """Return the largest contributions, and the root of the squares of the others."""
+    ordered = sorted(contributions.items(), key=lambda one: -one[1])
+    others = [value for _, value in ordered[_SHOWN_SOURCES:]]
+    return dict(ordered[:_SHOWN_SOURCES]) | ({"others": hypot(*others)} if others else {})
+
+
 def _bars(values: Mapping[Any, float]) -> dict[Any, float]:
     """Return the lengths of bars to both sides in percent of their track."""
     # 1e-9 K: without an error there is no bar.
@@ -392,9 +403,9 @@ def _html(opened: Model, figures: Figures, may_upload: bool, embedded: bool) -> 
     spec = {
         "embedded": embedded,
         "version": __version__,
-        "most_uploaded": MOST_UPLOADED,
         "stops": {row.path: row.stops for row in rows},
         "images": list(figures.images),
+        "shown": opened.shown(opened.controls.initial),
         "figures": list(figures.all),
         "extent": figures.extent,
         "shape": (top - bottom) / (right - left),

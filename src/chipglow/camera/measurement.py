@@ -194,7 +194,8 @@ class Measurement:
     ) -> "Measurement":
         """Return some frames, rows and columns; they share the tables of the band."""
         part = Measurement(self.data.isel(time=frames, y=rows, x=columns))
-        part.band = self.band
+        if "band_lower" in self.data.attrs:
+            part.band = self.band
         return part
 
     @property

@@ -98,6 +98,10 @@ class Sandbox:
             if process.poll() is None:
                 return process
             _end(process)  # the system ended it while it waited
+        return self.started()
+
+    def started(self) -> "subprocess.Popen[bytes]":
+        """Return a new process that waits for a job."""
         process = _started()
         try:
             self._in_time(process, STARTING)
@@ -166,20 +170,44 @@ class Isolated(Source):
         return Sandbox(self.name, self.patience, self.memory)
 
 
-@contextmanager
-def one_process() -> Iterator[None]:
-    """Let the readers of many files use one process, one after another, as its start takes 2 s.
+class ReaderProcess:
+    """A process that waits for the next file between uses, as its start takes 2 s.
 
     A process whose reader failed is replaced.
     """
-    kept: list[subprocess.Popen[bytes]] = []
-    token = _KEPT.set(kept)
+
+    def __init__(self) -> None:
+        self._waiting: list[subprocess.Popen[bytes]] = []
+
+    def start(self) -> None:
+        """Start the process before it is needed."""
+        if not self._waiting:
+            self._waiting.append(Sandbox("reader").started())
+
+    @contextmanager
+    def used(self) -> Iterator[None]:
+        """Read files in this process within the block."""
+        token = _KEPT.set(self._waiting)
+        try:
+            yield
+        finally:
+            _KEPT.reset(token)
+
+    def close(self) -> None:
+        """End the process."""
+        while self._waiting:
+            _end(self._waiting.pop())
+
+
+@contextmanager
+def one_process() -> Iterator[None]:
+    """Let the readers of many files use one process, one after another."""
+    process = ReaderProcess()
     try:
-        yield
+        with process.used():
+            yield
     finally:
-        _KEPT.reset(token)
-        for process in kept:
-            _end(process)
+        process.close()
 
 
 def _started() -> "subprocess.Popen[bytes]":
