@@ -49,9 +49,20 @@ ERROR_IMAGES: Final[Mapping[str, str]] = {
     "texture": "Error by texture",
 }
 
-ERRORS, CORRECTION = "error", "correction"
-SHOWN_IMAGES: Final[Mapping[str, str]] = {ERRORS: "Scene and error", CORRECTION: "Correction"}
-"""Sets of images: scene, measured and error; or measured and those of the correction."""
+ERRORS, CORRECTION, CAMERAS = "error", "correction", "cameras"
+SHOWN_IMAGES: Final[Mapping[str, str]] = {
+    ERRORS: "Scene and error",
+    CORRECTION: "Correction",
+    CAMERAS: "Two cameras",
+}
+"""Sets of images: scene, measured and error; measured and those of the correction; or the scene
+and the images of two cameras."""
+
+SECOND: Final = "second:"
+"""Beginning of the names of values that are the second camera's."""
+
+EDITED: Final = {"first": "First camera", "second": "Second camera"}
+"""Cameras that the controls change."""
 
 CORRECTION_IMAGES: Final[Mapping[str, str]] = {
     "corrected": "Corrected temperature",
@@ -70,10 +81,15 @@ PARTS: Final[Mapping[str, str]] = {
 }
 """Parts of a measured frame that are corrected, around the cursor."""
 
+REFLECTED: Final = "293 K"
+"""Reflected temperature of a measurement: the default of `chipglow.correct`."""
+
 CORRECTING: Final = ("emissivity", "camera.psf", "camera.reflected", "corrected_part")
 """Beginnings of the paths of controls on which the correction of a measurement depends."""
 
 _ONLY_WITH: Final[Mapping[str, str]] = {
+    "edited": CAMERAS,
+    "set_emissivity": CAMERAS,
     "scene_image": ERRORS,
     "error_image": ERRORS,
     "analysis.reference": ERRORS,
@@ -120,6 +136,15 @@ class ShownStudy(Study):
         float | None,
         Parameter("Emissivity of the measured object; none: not known.", over=0.0, most=1.0),
     ] = None
+    edited: Annotated[str, Parameter("Camera that the controls change.")] = "first"
+    set_emissivity: Annotated[
+        float,
+        Parameter(
+            "Emissivity set in the camera, by which it computes the temperature that it shows.",
+            over=0.0,
+            most=1.0,
+        ),
+    ] = 1.0
     corrected_part: Annotated[str, Parameter("Part of a frame that is corrected.")] = "48"
     emissivity_uncertainty: Annotated[
         float, Parameter("Standard uncertainty of the mean emissivity.", least=0.0, under=1.0)
@@ -215,6 +240,8 @@ TABLE: Final = (
     Control("scene_image", "Scene image", "Scene"),
     Control("error_image", "Error image", "Scene"),
     Control("analysis.reference", "Error against", "Scene"),
+    Control("edited", "Controls of", "Camera"),
+    Control("set_emissivity", "Emissivity set", "Camera", 0.05),
     Control("camera.band.0", "Band from", "Camera", 0.8, 8.0, 0.1),
     Control("camera.band.1", "Band to", "Camera", 1.0, 14.0, 0.1),
     Control("camera.pitch", "Pixel pitch", "Camera", 1.0, 30.0, 0.5),
@@ -270,6 +297,8 @@ class State:
 
     texts: Texts
     study: ShownStudy = field(compare=False)
+    second: "State | None" = field(default=None, compare=False)
+    """The same state with the second camera, if two are shown."""
 
     @property
     def cursor(self) -> tuple[float, float]:
@@ -318,7 +347,8 @@ class Controls:
     @classmethod
     def of_measurement(cls, study: Study, times: NDArray[np.float64], raster: Raster) -> "Controls":
         """Return the controls of a measurement: those of its frames and of their correction."""
-        study = changed(study, {"camera.psf": "none", "camera.blur": ()})
+        known = {"camera.psf": "none", "camera.blur": (), "camera.reflected": REFLECTED}
+        study = changed(study, known)
         frames = cls.of_frames(study, times, raster)
         options = {
             "camera.psf": _first("none", _psfs("Not stated")),
@@ -344,9 +374,14 @@ class Controls:
 
     def shown(self, state: State) -> dict[str, str]:
         """Return the texts of the controls that have an effect, as their fields show them."""
+        values = self.values(state)
+        if _edits_second(state) and state.second is not None:
+            values = {path: text for path, text in values.items() if not _of_camera(path)}
+            of_second = self.values(state.second).items()
+            values |= {path: text for path, text in of_second if _of_camera(path)}
         return {
             path: self.rows[path].shown(text)
-            for path, text in self.values(state).items()
+            for path, text in values.items()
             if _ONLY_WITH.get(path, state.study.images) == state.study.images
         }
 
@@ -369,7 +404,10 @@ class Controls:
 
     def state_with(self, state: State, texts: Texts) -> State:
         """Return the state with some controls at other values; a ValueError names the control."""
-        if unknown := [path for path in texts if path not in self.rows]:
+        if _edits_second(state):
+            texts = {SECOND + path if _of_camera(path) else path: texts[path] for path in texts}
+        names = {path: path.removeprefix(SECOND) for path in texts}
+        if unknown := [path for path in names.values() if path not in self.rows]:
             known = ", ".join(self.rows)
             raise ValueError(f"{unknown[0]}: unknown control, expected one of {known}")
         try:
@@ -377,21 +415,37 @@ class Controls:
             self._check(made)
         except ValueError as error:
             message = str(error)
-            for path in texts:
+            for path in names.values():
                 whole, _, number = (setting := self.rows[path].setting).rpartition(".")
                 message = message.removeprefix(f"{whole if number.isdigit() else setting}: ")
             message = message.removeprefix("exposure: ").removeprefix("camera: ")
-            labels = ", ".join(self.rows[path].label for path in texts)
+            labels = ", ".join(self.rows[path].label for path in names.values())
             raise ValueError(f"{labels}: {message}") from None
         initial = self.values(self.initial)
         written = {**made.texts, **self.values(made)}
-        return State(
-            {path: written[path] for path in made.texts if written[path] != initial.get(path)},
-            made.study,
+        if made.second is not None:
+            second = self.values(made.second)
+            written |= {SECOND + path: text for path, text in second.items() if _of_camera(path)}
+        return replace(
+            made,
+            texts={
+                path: written[path]
+                for path in made.texts
+                if written[path] != initial.get(path.removeprefix(SECOND))
+            },
         )
 
     def state(self, texts: Texts) -> State:
         """Return the state at given values; the initial ones where none is given."""
+        study = self._study({path: text for path, text in texts.items() if SECOND not in path})
+        if study.images != CAMERAS:
+            return State(texts, study)
+        common = {path: text for path, text in texts.items() if not _of_camera(path)}
+        own = {path.removeprefix(SECOND): text for path, text in common.items() if SECOND in path}
+        of_second = {path: text for path, text in common.items() if SECOND not in path} | own
+        return State(texts, study, State(of_second, self._study(of_second)))
+
+    def _study(self, texts: Texts) -> ShownStudy:
         study, words = self.study, dict[str, object]()
         for row in self.rows.values():
             if row.options:
@@ -405,7 +459,7 @@ class Controls:
             for path, row in self.rows.items()
             if path in texts and not row.options and _has(study, row.setting)
         }
-        return State(texts, changed(study, numbers))
+        return changed(study, numbers)
 
     def _check(self, state: State) -> None:
         """Raise a ValueError unless the camera can see the scene, and places are in the image."""
@@ -421,11 +475,22 @@ class Controls:
             camera = state.study.camera.on(self.raster, state.study.seed)
             duration = camera.frame_duration(self.raster)
             frame_weights(self.scene.times, self.scene.frame_spacing, state.study.start, duration)
+        if state.second is not None:
+            self._check(state.second)
 
 
 def shown_study(study: Study, **shown: Any) -> ShownStudy:
     """Return a study with settings of the page, such as the start of the exposure."""
     return ShownStudy(**{name: getattr(study, name) for name in study.given}, **shown)
+
+
+def _of_camera(path: str) -> bool:
+    """Return whether a control is one of a camera: not of its surroundings."""
+    return path == "set_emissivity" or (path.startswith("camera.") and path != "camera.reflected")
+
+
+def _edits_second(state: State) -> bool:
+    return state.study.images == CAMERAS and state.study.edited == "second"
 
 
 def _word(row: Control, texts: Texts) -> str:
@@ -490,6 +555,7 @@ def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
         "scene_image": scene_images,
         "error_image": ERROR_IMAGES,
         "images": SHOWN_IMAGES,
+        "edited": EDITED,
         "analysis.reference": REFERENCES,
         "camera.psf_order": {"detector": "Blur on the pixels", "optics": "Blur on the scene"},
     }

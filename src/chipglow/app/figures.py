@@ -36,6 +36,7 @@ TITLES: Final = {
     "scene": "Scene: true temperature / °C",
     "measured": "Measured radiance temperature / °C",
     "error": "Error / K",
+    "second": "Second camera / °C",
     "corrected": "Corrected temperature / °C",
     "half_width": f"{CORRECTION_IMAGES['half_width']} / K",
     "true": "True temperature / °C",
@@ -52,7 +53,7 @@ _MEASURED: Final = "#2b7fd0"
 _REFERENCE: Final = "#7d858f"
 _CORRECTED: Final = "#c2571a"
 
-_BORDER: Final = 46
+_BORDER: Final = 54
 """Pixels on the left of a figure for its labels, the same for all, so that they are aligned."""
 
 _LINE_HEIGHT: Final = 150
@@ -173,11 +174,14 @@ class Line:
             self.band.data = {"along": [], "low": [], "high": []}
 
     def show_corrected(self, curves: Mapping[str, Array]) -> None:
-        """Show or hide the corrected temperature, and shade its interval."""
-        is_known = "corrected" in curves
-        self.corrected.visible = self.corrected_item.visible = is_known
+        """Show or hide a third curve: the corrected temperature with its interval, or a camera."""
+        is_shown, is_known = "corrected" in curves, "low" in curves
+        self.corrected.visible = self.corrected_item.visible = is_shown
+        label = "corrected" if is_known else "second camera"
+        self.corrected_item.label = {"value": label}
         if self.reference_item is not None:
             self.reference_item.label = {"value": "true" if is_known else "reference"}
+            self.reference_item.visible = is_known or not is_shown
         self.shade.glyph.fill_color = _CORRECTED if is_known else _MEASURED
         if is_known:
             inside = np.isfinite(curves["low"]) & np.isfinite(curves["high"])

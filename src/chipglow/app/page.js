@@ -1,7 +1,7 @@
 // The page of the app around its figures. Its content comes from Python in messages of a kind and a
 // content; what the user does goes back in messages.
 
-const BORDER = 46, GAP = 18, LEAST_FRAME = 180;
+const BORDER = 54, GAP = 18, LEAST_FRAME = 180;
 const NARROW = 888, LEAST_PAIR = 560; // widths in pixels of the part beside the controls
 const VIEW_WIDTH = 160; // µm
 const MOST_ACROSS = 3; // images in a row

@@ -18,6 +18,7 @@ from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.images import errors_of, exposed_chain, parts_of
 from chipglow.analysis.read import Schedule, SurfacePlaces, read
 from chipglow.app.controls import (
+    CAMERAS,
     CORRECTING,
     CORRECTION,
     CORRECTION_IMAGES,
@@ -46,6 +47,7 @@ from chipglow.correction import (
 from chipglow.drawing.scales import HEAT, PLAIN, SIGNED, ends, round_limit
 from chipglow.io import StoredScene
 from chipglow.quantities import ZERO_CELSIUS, Array, Brief
+from chipglow.radiometry import ObjectParameters
 from chipglow.scene import Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 from chipglow.study import fit
@@ -183,6 +185,7 @@ class Picture(Brief):
     absent: Mapping[str, str] = field(default_factory=dict)  # why error images are 0 everywhere
     reference: str = ""  # label of the reference
     corrected: Corrected | None = None
+    second: Panel | None = None  # image of the second camera
 
     @property
     def lower_limit(self) -> float | None:
@@ -236,7 +239,7 @@ class SceneModel:
     controls: Controls
     file: str | None  # the scene as a saved study names it; None for the study's cut
     images: ClassVar[tuple[str, ...]] = (
-        "scene", "measured", "corrected", "half_width", "true", "error"
+        "scene", "measured", "second", "corrected", "half_width", "true", "error",
     )  # fmt: skip
     notes: ClassVar[Notes] = Notes()
     _caches: dict[str, dict[Hashable, Any]] = field(
@@ -255,12 +258,15 @@ class SceneModel:
         """Return the names of the images at a state."""
         if state.study.images == CORRECTION:
             return ("measured", *CORRECTION_IMAGES)
-        return ("scene", "measured", "error")
+        third = "second" if state.study.images == CAMERAS else "error"
+        return ("scene", "measured", third)
 
     def is_ready(self, state: State) -> bool:
         """Return whether the exact picture needs no quick look, as it takes milliseconds."""
         if self.coarse is None:
             return True
+        if state.second is not None and not self.is_ready(state.second):
+            return False
         key, camera = self._exposure_key(state), state.study.camera
         kind = camera.psf.kind if camera.psf else ""
         on_samples = camera.psf_order != "detector" and kind == "annular-aperture"
@@ -307,6 +313,8 @@ class SceneModel:
             _crossings(state, scene.tool), quick, camera, exposure, parts, _absent(state, surface),
             reference,
         )  # fmt: skip
+        if state.second is not None:
+            return _with_second(picture, self.picture(state.second, quick, check))
         if state.study.images != CORRECTION:
             return picture
         known = self._caches["correction"].get(self._correction_key(state))
@@ -382,6 +390,11 @@ class SceneModel:
         calibration = camera.calibration(raster.shape)
         if calibration and np.isfinite(numbers["measured"]):
             numbers["uncertainty"] = calibration.netd(numbers["measured"])
+        if picture.second is not None:
+            pixel = nearest(picture.second.values, picture.second.raster, at)
+            numbers["second"] = float(pixel) + ZERO_CELSIUS
+            shown = nearest(picture.panels["measured"].values, raster, at)
+            numbers["first"] = float(shown) + ZERO_CELSIUS
         numbers["sample temperature"] = sample_of("temperature") + ZERO_CELSIUS
         numbers["sample emissivity"] = sample_of("emissivity")
         return numbers
@@ -822,6 +835,51 @@ def _around_cursor(state: State, pixels: Raster, half: int) -> tuple[slice, slic
         slice(max(middle - half, 0), min(middle + half, count))
         for middle, count in zip(middles, pixels.shape, strict=True)
     )
+
+
+def _with_second(picture: Picture, other: Picture) -> Picture:
+    """Return the images of scene and two cameras on one scale.
+
+    The cameras show temperatures by the emissivities that are set in them.
+    """
+    first, second = (
+        replace(_set_panel(one), name=f"{name} camera{_set_text(one)}")
+        for one, name in ((picture, "First"), (other, "Second"))
+    )
+    scene = picture.panels["scene"]
+    shown = [first, second, *([scene] if scene.unit == "°C" else [])]
+    limits = min(one.limits[0] for one in shown), max(one.limits[1] for one in shown)
+    first, second = (replace(one, limits=limits) for one in (first, second))
+    scene = replace(scene, limits=limits) if scene.unit == "°C" else scene
+    panels = {"scene": scene, "measured": first, "second": second}
+    lines = {}
+    for name, curves in picture.lines.items():
+        line = picture.state.line(name).line(picture.raster.spacing)
+        measured, of_second = (sample(one.values, one.raster, line.points) for one in shown[:2])
+        unknown = np.full_like(measured, nan)
+        lines[name] = {
+            "along": curves["along"], "measured": measured, "reference": unknown,
+            "corrected": of_second,
+        }  # fmt: skip
+    return replace(picture, panels=panels, lines=lines, second=second)
+
+
+def _set_panel(picture: Picture) -> Panel:
+    """Return the temperatures that a camera shows by the emissivity that is set in it."""
+    study, panel, camera = picture.state.study, picture.panels["measured"], picture.camera
+    if study.set_emissivity == 1.0:
+        return panel
+    assert camera is not None
+    reflected = float(surroundings_of(camera).values)
+    known = ObjectParameters(emissivity=study.set_emissivity, reflected=reflected)
+    radiance = camera.band.radiance(panel.values + ZERO_CELSIUS)
+    values = known.temperature(radiance, camera.band) - ZERO_CELSIUS
+    return replace(panel, values=values, limits=ends(values, 0.0, 100.0, 10.0))
+
+
+def _set_text(picture: Picture) -> str:
+    emissivity = picture.state.study.set_emissivity
+    return "" if emissivity == 1.0 else f", emissivity {emissivity:g}"
 
 
 def _with_correction(

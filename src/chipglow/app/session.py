@@ -167,6 +167,8 @@ class Session:
         self._notify("numbers", picture, numbers, {})
         if state.study.images == CORRECTION:
             self._correct(picture, numbers)
+        elif state.second is not None:
+            return
         elif contributions := model.contributions(picture, work.check):
             self._notify("numbers", picture, numbers, contributions)
 

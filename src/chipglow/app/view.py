@@ -33,6 +33,14 @@ from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.quantities.format import quantity_text, readable, rounded_text, uncertain_decimals
 
 _FOLDER: Final = Path(__file__).parent
+_DROPPER_STYLE: Final = """
+.filepond--root { margin: 0; font: inherit; min-height: 28px; }
+.filepond--root .filepond--drop-label { min-height: 28px; color: inherit; }
+.filepond--drop-label label { padding: 2px; font-size: 12px; }
+.filepond--panel-root { background-color: rgba(128, 128, 128, 0.12); border: 1px dashed #8a9099; }
+"""
+"""The drop area as high as the buttons next to it, in either theme."""
+
 _SHOWN_SOURCES: Final = 3
 """Sources of uncertainty at the cursor that have a bar of their own."""
 
@@ -124,7 +132,7 @@ class PageView:
         """Return where files are dropped."""
         dropper = pn.widgets.FileDropper(
             max_file_size=f"{MOST_UPLOADED // 1024**2}MB", layout="compact", previews=[],
-            width=230, margin=0,
+            width=230, margin=0, stylesheets=[_DROPPER_STYLE],
         )  # fmt: skip
         dropper.param.watch(lambda event: self._on_dropped(event.new), "value")
         return dropper
