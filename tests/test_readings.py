@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from chipglow.camera import Flag, Measurement
 from chipglow.io import write_measurement
 from chipglow.laboratory.emissivity import EmissivityLine, load_places, true_temperatures
-from chipglow.laboratory.readings import histogram, place_curves, profile, read_places
+from chipglow.laboratory.readings import histogram, isotherm, place_curves, profile, read_places
 from chipglow.radiometry import Band
 from chipglow.scene import Circle, Pixel, Polygon, Polyline, Raster, Region
 from chipglow.text import DescriptionError
@@ -159,6 +159,18 @@ def test_a_histogram_counts_each_usable_pixel_once():
     empty = histogram(np.full((40, 50), np.nan), BOX.mask(RASTER), "box")
     assert empty.pixels.size == 0
     assert empty.to_frame().empty
+
+
+def test_the_isotherm_of_a_cone_is_a_circle():
+    x, y = np.meshgrid(RASTER.x - 150e-6, RASTER.y - 120e-6)
+    cone = 700.0 - 1e6 * np.hypot(x, y)
+    (line,) = isotherm(cone, RASTER, 650.0)
+    radius = np.hypot(*(line - [150e-6, 120e-6]).T)
+    # A chord between neighbouring pixels, 6 µm apart, is inside a circle of 50 µm by 6²/(8 × 50).
+    np.testing.assert_allclose(radius, 50e-6, atol=0.1e-6)
+    cone[:, :25] = np.nan
+    assert all(line[:, 0].min() > 150e-6 for line in isotherm(cone, RASTER, 650.0))
+    assert isotherm(np.full((40, 50), np.nan), RASTER, 650.0) == []
 
 
 PLACES = """

@@ -77,7 +77,14 @@ def picture_file(
         figure.colorbar(shown, label=title, shrink=0.8)
         if view.isotherm is not None and np.isfinite(celsius).any():
             level = view.isotherm - ZERO_CELSIUS
-            axes.contour(1e6 * raster.x, 1e6 * raster.y, celsius, [level], colors="white")
+            axes.contour(
+                1e6 * raster.x,
+                1e6 * raster.y,
+                celsius,
+                [level],
+                colors="white",
+                linestyles="dashed",
+            )
         for mark in marks:
             x, y = 1e6 * mark.outline.T
             for colour, wide in (("black", 2.4), ("white", 1.2)):

@@ -51,7 +51,8 @@ class Mark:
     @property
     def radius(self) -> float:
         """Distance of its first two points in m."""
-        return float(np.hypot(*np.subtract(*self.points[:2])))
+        (x, y), (rim_x, rim_y) = self.points[:2]
+        return float(np.hypot(rim_x - x, rim_y - y))
 
     @property
     def line(self) -> EmissivityLine | None:

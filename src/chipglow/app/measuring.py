@@ -20,7 +20,6 @@ from bokeh.models import (
 )
 from bokeh.palettes import Cividis256, Greys256, Inferno256, Turbo256, Viridis256
 from bokeh.plotting import figure
-from contourpy import contour_generator
 
 from chipglow.app.export import csv_file, picture_file, workbook
 from chipglow.app.figures import MICRONS, TEXT
@@ -63,7 +62,7 @@ _COLUMNS: Final = {
 """Columns of the table on the page with their titles."""
 
 _HINTS: Final[Mapping[str, str]] = {
-    "cursor": "Choose a shape above the images and draw it.",
+    "look": "Choose a shape above the images and draw it.",
     "point": "Point: click on an image.",
     "line": "Line: drag from end to end.",
     "box": "Box: drag from corner to corner.",
@@ -100,7 +99,8 @@ class Measuring:
         self._view = ImageView()
         self._reader = Reader(opened)
         self._curves: PlaceCurves | None = None
-        self._table = pd.DataFrame()
+        self._table, self._counted = pd.DataFrame(), pd.DataFrame()
+        self._profiles: dict[str, pd.DataFrame] = {}
         self._drawn = DrawnPlaces(
             opened.figures, self._add, self._move, self._remove, self._hint_at
         )
@@ -188,7 +188,7 @@ class Measuring:
 
     # Readings
 
-    def _refresh(self, *_: Any) -> None:
+    def _refresh(self) -> None:
         """Show and read all places in the frame that is shown."""
         if not self._reader.is_ready:
             return
@@ -228,7 +228,7 @@ class Measuring:
         }
         self._profiles = {one.place: one.to_frame() for one in profiles}
 
-    def _show_histogram(self, *_: Any) -> None:
+    def _show_histogram(self) -> None:
         """Show the frequency of temperatures in the selected place, by default the last region."""
         areas = [number for number, mark in enumerate(self._marks) if mark.region.has_area]
         chosen = [number for number in self._rows.selection if number < len(self._marks)]
@@ -279,7 +279,7 @@ class Measuring:
 
     # View
 
-    def _on_view(self, *_: Any) -> None:
+    def _on_view(self) -> None:
         def kelvins(widget: Any) -> float | None:
             return None if widget.value is None else widget.value + ZERO_CELSIUS
 
@@ -304,14 +304,11 @@ class Measuring:
                 _mapper(self._opened.figures[name]).update(
                     palette=_COLOURS[self._view.palette], low=low, high=high
                 )
-        level, raster = self._view.isotherm, self._reader.raster
-        lines = []
-        if level is not None and np.isfinite(self._reader.kelvins).any():
-            values = np.ma.masked_invalid(self._reader.kelvins)
-            lines = contour_generator(MICRONS * raster.x, MICRONS * raster.y, values).lines(level)
+        level = self._view.isotherm
+        lines = [] if level is None else self._reader.isotherm(level)
         self._drawn.isotherm.data = {
-            "xs": [line[:, 0].tolist() for line in lines],
-            "ys": [line[:, 1].tolist() for line in lines],
+            "xs": [(MICRONS * line[:, 0]).tolist() for line in lines],
+            "ys": [(MICRONS * line[:, 1]).tolist() for line in lines],
         }
 
     def _limits(self) -> tuple[float, float]:
@@ -351,11 +348,11 @@ class Measuring:
         }
 
     def _session_text(self) -> str:
-        view = {"frame": self._opened.frame, "palette": self._view.palette}
+        view: dict[str, Any] = {"frame": self._opened.frame, "palette": self._view.palette}
         for name in ("low", "high", "isotherm"):
             if (kelvins := getattr(self._view, name)) is not None:
                 view[name] = TEMPERATURE.text(round(kelvins, 6))
-        return places_text(self._marks, self._opened.name, self._opened.reflected, view)
+        return places_text(self._marks, self._opened.source, self._opened.reflected, view)
 
     def _picture(self) -> bytes:
         celsius = self._reader.kelvins - ZERO_CELSIUS
@@ -370,10 +367,13 @@ class Measuring:
     def _build(self) -> None:
         """Make the widgets and figures of the panel."""
         self._rows = _table_widget()
-        self._rows.on_edit(self._on_edit)
-        self._rows.on_click(lambda event: self._remove(event.row), column="delete")
-        self._rows.param.watch(self._show_histogram, "selection")
-        self._hint = pn.pane.HTML(_HINTS["cursor"], margin=2)
+        # Panel calls these without the lock of the document, which changes of it need.
+        self._rows.on_edit(lambda event: self._later(lambda: self._on_edit(event)))
+        self._rows.on_click(
+            lambda event: self._later(lambda: self._remove(event.row)), column="delete"
+        )
+        self._rows.param.watch(lambda _: self._later(self._show_histogram), "selection")
+        self._hint = pn.pane.HTML(_HINTS["look"], margin=2)
         self._warnings = pn.pane.Markdown("", visible=False)
         self._low = _number("Colours from / °C")
         self._high = _number("to / °C")
@@ -383,10 +383,8 @@ class Measuring:
             name="Palette", options=options, value=self._view.palette, width=130
         )
         for widget in (self._low, self._high, self._isotherm, self._palette):
-            widget.param.watch(self._on_view, "value")
+            widget.param.watch(lambda _: self._later(self._on_view), "value")
         self._copied = ColumnDataSource({"text": [""]})
-        self._profiles: dict[str, pd.DataFrame] = {}
-        self._counted = pd.DataFrame()
         self._build_figures()
         self.tools = pn.pane.Bokeh(self._drawn.choice, margin=0)
         self.panel = pn.Column(

@@ -60,6 +60,8 @@ class Opened:
     """
 
     name: str
+    source: str
+    """The file as a session names it."""
     notes: Notes
     figures: Mapping[str, Any]
     frames: Frames

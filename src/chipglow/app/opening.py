@@ -44,6 +44,7 @@ from chipglow.io import (
 )
 from chipglow.io.measurement_file import holds
 from chipglow.io.sandbox import ReaderProcess
+from chipglow.laboratory.emissivity import PlacesDescription, is_places, load_places
 from chipglow.laboratory.recordings import StoredFrames
 from chipglow.quantities import Array, unchecked
 from chipglow.scene import Raster, Scene
@@ -133,6 +134,9 @@ class Asking:
     contents: tuple[Content, ...]
     error: str = ""
     settings: Mapping[str, str] = field(default_factory=dict)
+    source: str = ""
+    places: PlacesDescription | None = None
+    """See the models."""
 
     def answered(
         self,
@@ -159,7 +163,7 @@ class Asking:
             return replace(self, error=self._by_name(str(error)), settings=settings)
         if settings:
             save_description(self.path, known)
-        return opened
+        return replace(opened, source=self.source, places=self.places)
 
     def _by_name(self, message: str) -> str:
         return message.replace(str(self.path), self.name).replace(self.path.name, self.name)
@@ -176,6 +180,26 @@ def open_any(path: Scene | str | Path | None, study: Study | None = None) -> Mod
     if isinstance(path, Scene):
         return open_scene_object(path, study, "scene")
     path = Path(path)
+    if _is_yaml(path.name) and is_places(read_yaml(path)):
+        return _session(path)
+    return replace(_opened(path, study), source=str(path.resolve()))
+
+
+def _session(path: Path) -> Model | Asking:
+    """Open the file that a session names, with its places and view."""
+    places = load_places(path)
+    if places.file is None:
+        raise ValueError(f"{path}: file: is missing; state the measurement or camera file to open")
+    file = path.parent / places.file
+    if not file.exists():
+        raise FileNotFoundError(f"{path}: file: {file}: there is no such file")
+    if _is_yaml(file.name) and is_places(read_yaml(file)):
+        raise ValueError(f"{path}: file: {file} is a session too, expected a measurement")
+    return replace(open_any(file), places=places)
+
+
+def _opened(path: Path, study: Study | None) -> Model | Asking:
+    """Open a file or folder by its content."""
     if path.is_dir() and path.suffix.lower() != ".zarr":
         return _results(path)
     if _is_yaml(path.name):
@@ -274,14 +298,15 @@ def open_uploaded(path: Path, name: str, others: Iterable[Model | Asking] = ()) 
     """
     try:
         if _is_yaml(name):
-            return _study_of_open_scene(path, name, others)
+            others = list(others)
+            return _session_of_open_file(path, others) or _study_of_open_scene(path, name, others)
         opened = open_any(path)
     except (ValueError, OSError) as error:
         message = str(error).replace(str(path), name).replace(path.name, name)
         raise ValueError(message) from None
     if isinstance(opened, SceneModel):
-        return replace(opened, name=name, file=name)
-    return replace(opened, name=name)
+        return replace(opened, name=name, file=name, source=name)
+    return replace(opened, name=name, source=name)
 
 
 def _results(folder: Path) -> SceneModel:
@@ -314,6 +339,18 @@ def _shown_of(path: Path) -> dict[str, Any]:
             shown = parse_yaml(line.removeprefix(SHOWN_LINE))
             return shown if isinstance(shown, dict) and shown.keys() <= set(SHOWN) else {}
     return {}
+
+
+def _session_of_open_file(path: Path, others: Iterable[Model | Asking]) -> Model | None:
+    """Return the open file that a session names, with its places; None for another file."""
+    if not is_places(read_yaml(path)):
+        return None
+    places = load_places(path)
+    named = Path(places.file or "").name
+    for other in others:
+        if not isinstance(other, Asking) and named == Path(other.source).name:
+            return replace(other, places=places)
+    raise ValueError(f"{path}: its file {named or 'is not stated'}: open that file first")
 
 
 def _study_of_open_scene(path: Path, name: str, others: Iterable[Model | Asking]) -> SceneModel:

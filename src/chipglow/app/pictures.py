@@ -46,6 +46,7 @@ from chipglow.correction import (
 )
 from chipglow.drawing.scales import HEAT, PLAIN, SIGNED, ends, round_limit
 from chipglow.io import StoredScene
+from chipglow.laboratory.emissivity import PlacesDescription
 from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 from chipglow.radiometry import ObjectParameters
 from chipglow.scene import Material, Raster, Scene, Tool, sample
@@ -238,6 +239,10 @@ class SceneModel:
     coarse: Scene | None  # with fewer samples, for a quick look before the exact picture
     controls: Controls
     file: str | None  # the scene as a saved study names it; None for the study's cut
+    source: str = ""
+    """The file as a session names it."""
+    places: PlacesDescription | None = None
+    """Places and view of the session that was opened."""
     images: ClassVar[tuple[str, ...]] = (
         "scene", "measured", "second", "corrected", "half_width", "true", "error",
     )  # fmt: skip
@@ -624,6 +629,10 @@ class MeasurementModel(_FramesModel):
     controls: Controls
     description: str = ""
     """YAML of a camera file's settings."""
+    source: str = ""
+    """The file as a session names it."""
+    places: PlacesDescription | None = None
+    """Places and view of the session that was opened."""
     _last: dict[int, tuple[xr.Dataset, dict[str, Panel], str]] = field(
         init=False, default_factory=dict, repr=False
     )
@@ -760,6 +769,10 @@ class CorrectionModel(_FramesModel):
     name: str
     correction: Correction
     controls: Controls
+    source: str = ""
+    """The file as a session names it."""
+    places: PlacesDescription | None = None
+    """Places and view of the session that was opened."""
     tool: ClassVar[None] = None
     _last: dict[int, tuple[Corrected, xr.Dataset, Panel]] = field(
         init=False, default_factory=dict, repr=False

@@ -17,6 +17,7 @@ from chipglow.laboratory.readings import (
     PlaceReading,
     Profile,
     histogram,
+    isotherm,
     place_curves,
     profile,
     read_place,
@@ -120,6 +121,10 @@ class Reader:
             return histogram(self.kelvins, self.mask(mark.region), mark.name)
         except ValueError:
             return histogram(np.full(self.raster.shape, nan), np.ones(1, np.bool_), mark.name)
+
+    def isotherm(self, level: float) -> list[Array]:
+        """Return the lines of a temperature in K."""
+        return isotherm(self.kelvins, self.raster, level)
 
     def curves(self, marks: Sequence[Mark], check: Callable[[], None]) -> PlaceCurves:
         """Return the temperatures of places over all frames."""

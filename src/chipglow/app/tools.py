@@ -21,8 +21,8 @@ from chipglow.app.marks import Kind, Mark
 from chipglow.drawing.scales import COLOURS
 from chipglow.scene.regions import Point
 
-_KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
-_CURSOR, _EDIT = "cursor", "edit"
+_TOOLS: Final[tuple[str, ...]] = ("look", *get_args(Kind), "edit")
+"""What a press on an image does: move cursor and view, draw a place, or edit one."""
 
 _ACTIVATE: Final = """
 const chosen = cb_obj.active;
@@ -60,7 +60,7 @@ class DrawnPlaces:
         self._points = ColumnDataSource({"x": [], "y": []})
         self._strokes = ColumnDataSource({"xs": [], "ys": []})
         self.isotherm = ColumnDataSource({"xs": [], "ys": []}, name="isotherm")
-        groups: list[list[Any]] = [[] for _ in (_CURSOR, *_KINDS, _EDIT)]
+        groups: list[list[Any]] = [[] for _ in _TOOLS]
         for one in figures.values():
             tools = self._draw_on(one)
             for group, tool in zip(groups[1:], tools, strict=True):
@@ -70,7 +70,7 @@ class DrawnPlaces:
         self._handles.on_change("data", self._on_handles)
         self._points.on_change("data", self._on_point)
         self._strokes.on_change("data", self._on_stroke)
-        labels = [name.capitalize() for name in (_CURSOR, *_KINDS, _EDIT)]
+        labels = [name.capitalize() for name in _TOOLS]
         self.choice = RadioButtonGroup(labels=labels, active=0, stylesheets=[_BUTTONS])
         self.choice.on_change("active", lambda attr, old, new: chosen(self._kind))
         self.choice.js_on_change("active", CustomJS(args={"groups": groups}, code=_ACTIVATE))
@@ -147,7 +147,7 @@ class DrawnPlaces:
     @property
     def _kind(self) -> str:
         """The choice of the user."""
-        return (_CURSOR, *_KINDS, _EDIT)[self.choice.active]
+        return _TOOLS[int(self.choice.active)]
 
     def _on_point(self, _name: str, _old: Any, new: Mapping[str, Any]) -> None:
         if len(new["x"]):

@@ -22,7 +22,7 @@ from panel.custom import Child, Children, JSComponent
 from chipglow import __version__
 from chipglow.analysis.attribution import AttributionReference
 from chipglow.analysis.images import PARTS
-from chipglow.app.controls import CORRECTION, ERROR_IMAGES, WHOLE, Texts
+from chipglow.app.controls import CORRECTION, ERROR_IMAGES, WHOLE, Texts, rounded
 from chipglow.app.figures import TEXT, Figures
 from chipglow.app.measuring import Measuring
 from chipglow.app.opened import Opened
@@ -31,6 +31,7 @@ from chipglow.app.pictures import Drawn, Model, Picture, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.quantities.format import quantity_text, readable, rounded_text, uncertain_decimals
+from chipglow.quantities.units import KELVINS
 
 _FOLDER: Final = Path(__file__).parent
 _DROPPER_STYLE: Final = """
@@ -88,14 +89,19 @@ class PageView:
         self.session = Session(opened, self._notified)
         self._refused = ""
         try:
-            self.session.restore(texts or {})
+            self.session.restore({**_session_texts(opened), **(texts or {})})
         except ValueError as error:
             self._refused = f"Link: {error}"
         self.figures = Figures(opened.raster, opened.tool, opened.images)
         images = {name: one.figure for name, one in self.figures.images.items()}
         model, state = self.session.model, self.session.state
-        self.opened = Opened(opened.name, opened.notes, images, model.frames(state))
+        self.opened = Opened(opened.name, opened.source, opened.notes, images, model.frames(state))
         self.measuring = Measuring(self.opened, self._later, self._say)
+        try:
+            if opened.places is not None:
+                self.measuring.restore(opened.places)
+        except ValueError as error:
+            self._refused = f"Session: {error}"
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._show_opened = partial(self._send, "open")
@@ -381,6 +387,19 @@ class PageView:
             self._reported(show)
         finally:
             document.unhold()
+
+
+def _session_texts(opened: Model) -> dict[str, str]:
+    """Return the controls that the session of an open file states: frame and surroundings."""
+    places, texts = opened.places, dict[str, str]()
+    if places is None:
+        return texts
+    times = opened.frames(opened.controls.initial).times
+    if 0 < places.view.frame < len(times):
+        texts["start"] = f"{1e6 * rounded(float(times[places.view.frame])):.9g} us"
+    if "reflected" in places.given and "camera.reflected" in opened.controls.rows:
+        texts["camera.reflected"] = KELVINS.text(places.reflected)
+    return texts
 
 
 def _columns(curves: Mapping[str, Array]) -> dict[str, list[float]]:

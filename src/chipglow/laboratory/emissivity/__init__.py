@@ -25,6 +25,7 @@ from chipglow.laboratory.emissivity.file import (
 from chipglow.laboratory.emissivity.places import (
     PlacesDescription as PlacesDescription,
     RegionSection as RegionSection,
+    is_places as is_places,
     load_places as load_places,
     load_regions as load_regions,
 )

@@ -198,6 +198,11 @@ def _numbers(*coordinates: float | str) -> tuple[list[float], Literal["pixel", "
     return numbers, "m" if True in kinds else "pixel"
 
 
+def is_places(data: object) -> bool:
+    """Return whether the content of a YAML file is a file of places."""
+    return isinstance(data, dict) and bool({"regions", "points", "lines"} & data.keys())
+
+
 def load_places(path: str | Path) -> PlacesDescription:
     """Read the places of an image, and what is known of them, from a YAML file.
 

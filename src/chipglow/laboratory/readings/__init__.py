@@ -5,6 +5,7 @@ from chipglow.laboratory.readings.curves import (
     PlaceCurves as PlaceCurves,
     Profile as Profile,
     histogram as histogram,
+    isotherm as isotherm,
     place_curves as place_curves,
     profile as profile,
 )

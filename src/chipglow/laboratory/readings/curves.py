@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import pandas as pd
+from contourpy import LineType, contour_generator
 from numpy.typing import NDArray
 
 from chipglow.quantities import ZERO_CELSIUS, Array, Brief
@@ -165,3 +166,16 @@ def histogram(kelvins: Array, mask: NDArray[np.bool_], place: str) -> Histogram:
     bins = min(max(round(sqrt(known.size)), 1), _MOST_BINS)
     pixels, edges = np.histogram(known, bins)
     return Histogram(place, edges, pixels)
+
+
+def isotherm(kelvins: Array, raster: Raster, level: float) -> list[Array]:
+    """Return the lines at which an image in K has a temperature, each as x and y in m, (n, 2).
+
+    They end at unusable pixels (NaN) and are straight between neighbouring pixels.
+    """
+    if not np.isfinite(kelvins).any():
+        return []
+    contours = contour_generator(
+        raster.x, raster.y, np.ma.masked_invalid(kelvins), line_type=LineType.Separate
+    )
+    return [np.asarray(line, np.float64) for line in contours.lines(level)]

@@ -14,12 +14,14 @@ from chipglow.camera.measurement import WHOLE
 from chipglow.laboratory.emissivity import EmissivityLine, true_temperature
 from chipglow.laboratory.emissivity.observations import deviation_of
 from chipglow.quantities import ZERO_CELSIUS, Array, Brief
-from chipglow.scene import Area, Region
+from chipglow.scene import Area, Circle, Pixel, Polygon, Polyline, Region
 from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Estimate
 
 OUT_OF_RANGE: Final = Flag.UNDER_RANGE | Flag.SATURATED
 """Flags of pixels that the camera's range does not contain."""
+
+_SHAPES: Final = {Polygon: "polygon", Circle: "circle", Pixel: "point", Polyline: "line"}
 
 _MARGIN: Final = 2
 """Pixels around a place that are kept with it: they show the noise of a single pixel."""
@@ -81,7 +83,7 @@ class PlaceReading(Brief):
         true = Estimate(np.array(nan)) if self.true is None else self.true
         return {
             "place": self.place.name,
-            "shape": type(self.place.shape).__name__.lower(),
+            "shape": _SHAPES[type(self.place.shape)],
             "pixels": values.pixels,
             "out_of_range": values.out_of_range,
             "mean_degC": values.mean - ZERO_CELSIUS,
