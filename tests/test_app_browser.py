@@ -395,17 +395,23 @@ def test_the_image_is_corrected_while_the_controls_stay_live(page):
     page.locator("#status", has_text=re.compile("^Corrected: ")).wait_for()
     bars = page.get_by_role("table", name="Contributions to its standard uncertainty")
     assert bars.locator(".bar").count() >= 4
-    assert re.search(r"°C ± \d", number(page, "corrected (95 %)").inner_text())
+    assert re.search(r"°C ± \d", number(page, "true temperature ± U (95 %)").inner_text())
     assert control(page, "error_image").is_hidden()
     title = "(name) => Bokeh.documents[0].get_model_by_name(name).title.text"
-    assert page.evaluate(title, "error_figure") == "Half-width (95 %) / K"
-    control(page, "correction_image").select_option("true")
-    page.wait_for_function(f"() => ({title})('error_figure') === 'True temperature / °C'")
+    titles = {
+        name: page.evaluate(title, f"{name}_figure") for name in ("half_width", "true", "error")
+    }
+    assert titles == {
+        "half_width": "Half-width (95 %) / K",
+        "true": "True temperature / °C",
+        "error": "Corrected − true / K",
+    }
+    assert page.locator("#figure-true").is_visible() and page.locator("#figure-scene").is_hidden()
 
 
 def test_all_is_reached_by_the_keyboard_in_either_theme(page):
     reached = set()
-    page.locator("button", has_text="Open…").focus()
+    page.get_by_role("button", name="study.yaml").focus()
     for _ in range(70):
         name = page.evaluate("""() => {
           let one = document.activeElement;

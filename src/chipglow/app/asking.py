@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias, get_args
 
 from h5py import is_hdf5
 
@@ -22,7 +22,7 @@ from chipglow.laboratory.recordings import (
     load_description,
     measurement_text,
 )
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import FileBeside, Parameter, Part
 
 Content: TypeAlias = Literal["measurement", "scene"]
 """Content of a file: frames of a camera, which `convert` reads, or fields, which `import` reads."""
@@ -74,7 +74,10 @@ def _fields(part: type[Part], before: str = "") -> Iterator[Setting]:
             yield from _fields(type(default), f"{before}{name}.")
         elif before or name not in ("file", "source"):
             kind = part._annotations[name].__origin__
-            yield Setting(f"{before}{name}", parameter, parameter.words(kind))
+            allowed = parameter.words(kind) or (
+                "path of a file" if FileBeside in get_args(kind) else ""
+            )
+            yield Setting(f"{before}{name}", parameter, allowed)
 
 
 def described(path: Path) -> Path:

@@ -17,6 +17,12 @@ _WIDTH: Final = 330
 _STYLE: Final = """
 :host { font: 14px/1.4 system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
 """
+_INTRODUCTION: Final = (
+    "The file states too little. Give the settings as for the command line; they are saved beside "
+    "it as {}.yaml. Other files are named by their path on this computer."
+)
+
+_ERROR_STYLE: Final = f"{_STYLE} :host {{ color: #b3261e; }}"
 
 
 class AskingPage:
@@ -31,7 +37,7 @@ class AskingPage:
         self._content = pn.widgets.Select(
             name="Content of the file", options=options, width=_WIDTH, visible=len(options) > 1
         )
-        self._said = pn.pane.Markdown("", stylesheets=[_STYLE], sizing_mode="stretch_width")
+        self._said = pn.pane.Markdown("", stylesheets=[_ERROR_STYLE], sizing_mode="stretch_width")
         self._button = pn.widgets.Button(name="Open", button_type="primary", width=_WIDTH)
         self._button.on_click(self._clicked)
         self._content.param.watch(lambda _: self._choose(), "value")
@@ -39,7 +45,7 @@ class AskingPage:
         self._done = pn.widgets.TextInput(visible=False)
         self._done.jscallback(value="window.location.search = cb_obj.value")
         self._asked = pn.Column(sizing_mode="stretch_width")
-        title = f"## {asking.name}\n\nSettings of this file are asked for, as by the command line."
+        title = f"## {asking.name}\n\n{_INTRODUCTION.format(asking.name)}"
         self.page = pn.Column(
             pn.pane.Markdown(title, stylesheets=[_STYLE], sizing_mode="stretch_width"),
             self._content,
@@ -79,8 +85,8 @@ class AskingPage:
 
     def _open(self, answer: tuple[Content, dict[str, str]]) -> None:
         opened = self._files.answer(self._key, *answer)
-        self._notified("failed" if isinstance(opened, Asking) else "opened",
-                       opened.error if isinstance(opened, Asking) else "")  # fmt: skip
+        error = opened.error if isinstance(opened, Asking) else ""
+        self._notified("failed" if error else "opened", error)
 
     def _notified(self, kind: str, text: str) -> None:
         def show() -> None:
@@ -103,7 +109,7 @@ def _field(setting: Setting, text: str) -> pn.widgets.TextInput:
     return pn.widgets.TextInput(
         name=setting.path,
         value=text,
-        placeholder=setting.allowed.removeprefix("none, "),
+        placeholder=setting.allowed.removeprefix("none, ").removeprefix("or "),
         description=setting.parameter.meaning,
         width=_WIDTH,
     )

@@ -245,6 +245,12 @@ class OpenFiles:
         self.process = ReaderProcess()
         self._opened = {"": self._tried(first)}
 
+    def warm(self) -> None:
+        """Prepare to open a file, so that the first one takes no longer than others."""
+        self.process.start()
+        band = Study().camera.build().band
+        band.temperature(band.radiance(np.full((2, 2), 600.0)))  # K: loads compiled kernels
+
     def find(self, key: str) -> Model | Asking | None:
         """Return an open file by its key; None if it is not open."""
         return self._opened.get(key)

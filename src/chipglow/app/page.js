@@ -3,7 +3,6 @@
 
 const BORDER = 54, GAP = 18, LEAST_FRAME = 180;
 const NARROW = 888, LEAST_PAIR = 560; // widths in pixels of the part beside the controls
-const VIEW_WIDTH = 160; // µm
 const MOST_ACROSS = 3; // images in a row
 const GRIP = 12; // pixels
 
@@ -170,7 +169,7 @@ export function render({ view, model, el }) {
     if (dataset.view !== "whole") {
       const places = points(dataset.view);
       const [x, y] = [0, 1].map((axis) => places.reduce((sum, one) => sum + one[axis] / places.length, 0));
-      const [half, tall] = [VIEW_WIDTH / 2, VIEW_WIDTH / 2 * spec.shape];
+      const [half, tall] = [spec.view / 2, spec.view / 2 * spec.shape];
       [left, right, bottom, top] = [x - half, x + half, y - tall, y + tall];
     }
     const { x_range, y_range } = named("measured_figure");

@@ -4,6 +4,7 @@ import secrets
 import signal
 import socket
 from contextlib import suppress
+from threading import Thread
 from typing import Any, Final
 
 import panel as pn
@@ -79,6 +80,7 @@ class App:
 
         before = {one: signal.signal(one, end) for one in (signal.SIGINT, signal.SIGTERM)}
         self.server.start()
+        Thread(target=self.files.warm, daemon=True).start()
         try:
             loop.start()
         finally:

@@ -42,6 +42,10 @@ _DROPPER_STYLE: Final = """
 """
 """The drop area as high as the buttons next to it, in either theme."""
 
+_VIEW_WIDTH: Final = 160.0
+_VIEW_SAMPLES: Final = 40
+"""Least width of the view of a place in µm, and in pixels or samples."""
+
 _SHOWN_SOURCES: Final = 3
 """Sources of uncertainty at the cursor that have a bar of their own."""
 
@@ -435,6 +439,7 @@ def _html(opened: Model, figures: Figures, may_upload: bool, embedded: bool) -> 
         "shown": opened.shown(opened.controls.initial),
         "figures": list(figures.all),
         "extent": figures.extent,
+        "view": max(_VIEW_WIDTH, 1e6 * _VIEW_SAMPLES * opened.raster.spacing),
         "shape": (top - bottom) / (right - left),
     }
     return _TEMPLATES.get_template("page.html").render(
