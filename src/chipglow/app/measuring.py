@@ -28,7 +28,7 @@ from chipglow.app.opened import Opened
 from chipglow.app.reading import MEASURED, Reader, table_of
 from chipglow.app.session import PAUSE, Newest
 from chipglow.app.tools import DrawnPlaces, colour_of
-from chipglow.laboratory.emissivity import PlacesDescription, reflected_temperature
+from chipglow.laboratory.emissivity import PlacesDescription
 from chipglow.laboratory.emissivity.places import ImageView, KnownEmissivity, Palette
 from chipglow.laboratory.readings import PlaceCurves
 from chipglow.quantities import ZERO_CELSIUS
@@ -78,6 +78,15 @@ _GRID: Final = {
 }
 """Figures side by side, as many as fit."""
 
+_TABLE_STYLE: Final = """
+.tabulator, .tabulator .tabulator-header, .tabulator .tabulator-header .tabulator-col,
+.tabulator .tabulator-tableholder .tabulator-table, .tabulator-row, .tabulator-row.tabulator-row-even
+{ background: transparent !important; color: inherit !important; }
+.tabulator-row.tabulator-selected
+{ background: color-mix(in srgb, currentColor 15%, transparent) !important; }
+"""
+"""The colours of the page, on light and on dark ground."""
+
 _LINE_HEIGHT: Final = 190
 """Height of the curves in pixels."""
 
@@ -106,7 +115,7 @@ class Measuring:
         )
         self._work = Newest(self._read_curves, self._failed)
         self._build()
-        opened.watch(self._refresh)
+        opened.watch(self._show_picture)
 
     def set_theme(self, theme: str) -> None:
         """Set the colours of the curves' text."""
@@ -153,11 +162,15 @@ class Measuring:
 
     def _change(self, act: Callable[[], Any]) -> None:
         """Change the places, and show and read them; what is not possible is said."""
-        try:
-            act()
-        except ValueError as error:
-            self._say(str(error), "error")
-        self._refresh()
+
+        def change() -> None:
+            try:
+                act()
+            except ValueError as error:
+                self._say(str(error), "error")
+            self._show_places()
+
+        self._later(change)  # together: the browser draws once
 
     def _on_edit(self, event: Any) -> None:
         def edit() -> None:
@@ -188,21 +201,24 @@ class Measuring:
 
     # Readings
 
-    def _refresh(self) -> None:
-        """Show and read all places in the frame that is shown."""
+    def _show_picture(self) -> None:
+        """Show the colours of a new picture, and read all places in it."""
+        self._reader.forget()
+        self._show_view()
+        self._show_places()
+
+    def _show_places(self) -> None:
+        """Show all places, and what they measure."""
         if not self._reader.is_ready:
             return
         self._drawn.show(self._marks)
-        self._show_view()
         self._show_table()
         self._show_lines()
         self._show_histogram()
         self._ask_curves()
 
     def _show_table(self) -> None:
-        reflected = self._opened.reflected
-        surroundings = None if reflected is None else reflected_temperature(reflected)
-        readings = [self._reader.read(mark, surroundings) for mark in self._marks]
+        readings = [self._reader.read(mark) for mark in self._marks]
         self._table = table_of(readings)
         rows = self._table.reindex(columns=[*_COLUMNS]).assign(
             emissivity=[mark.emissivity.mean if mark.emissivity else nan for mark in self._marks],
@@ -294,7 +310,8 @@ class Measuring:
         except ValueError as error:
             self._say(str(error).removeprefix("ImageView."), "error")
             return
-        self._refresh()
+        if self._reader.is_ready:
+            self._show_view()
 
     def _show_view(self) -> None:
         """Set colours and limits of the images of temperatures, and the isotherm."""
@@ -368,10 +385,8 @@ class Measuring:
         """Make the widgets and figures of the panel."""
         self._rows = _table_widget()
         # Panel calls these without the lock of the document, which changes of it need.
-        self._rows.on_edit(lambda event: self._later(lambda: self._on_edit(event)))
-        self._rows.on_click(
-            lambda event: self._later(lambda: self._remove(event.row)), column="delete"
-        )
+        self._rows.on_edit(self._on_edit)
+        self._rows.on_click(lambda event: self._remove(event.row), column="delete")
         self._rows.param.watch(lambda _: self._later(self._show_histogram), "selection")
         self._hint = pn.pane.HTML(_HINTS["look"], margin=2)
         self._warnings = pn.pane.Markdown("", visible=False)
@@ -467,6 +482,7 @@ def _table_widget() -> Any:
         sortable=False,
         layout="fit_data_table",
         theme="simple",
+        stylesheets=[_TABLE_STYLE],
         visible=False,
         sizing_mode="stretch_width",
     )

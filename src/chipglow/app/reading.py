@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from chipglow.app.marks import Mark
 from chipglow.app.opened import Opened
 from chipglow.camera import Measurement
+from chipglow.laboratory.emissivity import reflected_temperature
 from chipglow.laboratory.readings import (
     Histogram,
     PlaceCurves,
@@ -42,6 +43,7 @@ class Reader:
     def __init__(self, opened: Opened) -> None:
         self._opened = opened
         self._masks: dict[tuple[Region, Raster], NDArray[np.bool_]] = {}
+        self._readings: dict[tuple[Mark, float | None], PlaceReading] = {}
         self._band: Band | None = None
 
     @property
@@ -68,11 +70,23 @@ class Reader:
             self._masks[key] = place.mask(self.raster)
         return self._masks[key]
 
-    def read(self, mark: Mark, surroundings: Estimate | None) -> PlaceReading:
+    def forget(self) -> None:
+        """Forget the readings, as another frame is shown."""
+        self._readings.clear()
+
+    def read(self, mark: Mark) -> PlaceReading:
         """Read a place, with the true temperature by the correction that is shown, or emissivity.
 
         A place outside the image, which a change of the camera may cause, has no reading.
         """
+        key = mark, self._opened.reflected
+        if key not in self._readings:
+            reflected = self._opened.reflected
+            surroundings = None if reflected is None else reflected_temperature(reflected)
+            self._readings[key] = self._read(mark, surroundings)
+        return self._readings[key]
+
+    def _read(self, mark: Mark, surroundings: Estimate | None) -> PlaceReading:
         place, measured = mark.region, self._opened.measured
         try:
             mask = self.mask(place)

@@ -101,11 +101,6 @@ class PageView:
         model, state = self.session.model, self.session.state
         self.opened = Opened(opened.name, opened.source, opened.notes, images, model.frames(state))
         self.measuring = Measuring(self.opened, self._later, self._say)
-        try:
-            if opened.places is not None:
-                self.measuring.restore(opened.places)
-        except ValueError as error:
-            self._refused = f"Session: {error}"
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._show_opened = partial(self._send, "open")
@@ -113,6 +108,11 @@ class PageView:
         self._handled = 0
         self._began = 0.0
         self._picture: Picture | None = None
+        try:
+            if opened.places is not None:
+                self.measuring.restore(opened.places)
+        except ValueError as error:
+            self._refused = f"Session: {error}"
         self.page = Page(
             html=_html(opened, self.figures, files is not None, embedded),
             figures=[
