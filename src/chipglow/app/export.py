@@ -59,6 +59,7 @@ def picture_file(
     from matplotlib.figure import Figure
 
     from chipglow.drawing.drawing import style
+    from chipglow.drawing.scales import GREY
 
     left, right, bottom, top = (1e6 * edge for edge in raster.extent)
     with style():
@@ -73,7 +74,7 @@ def picture_file(
             vmin=limits[0],
             vmax=limits[1],
         )
-        shown.cmap.set_bad("#9ca3af")
+        axes.set_facecolor(GREY)  # shows where there is no value
         figure.colorbar(shown, label=title, shrink=0.8)
         if view.isotherm is not None and np.isfinite(celsius).any():
             level = view.isotherm - ZERO_CELSIUS

@@ -74,7 +74,7 @@ class Image:
         self.mapper = LinearColorMapper(
             palette=PALETTES[HEAT], low=0.0, high=1.0, nan_color=(0, 0, 0, 0.0)
         )
-        self._shown = np.zeros(0)
+        self._shown, self._colours = np.zeros(0), HEAT
         glyph = one.image(
             **{key: key for key in empty}, source=self.source, color_mapper=self.mapper
         )
@@ -97,7 +97,11 @@ class Image:
         """Show an image; Bokeh has its rows from the bottom."""
         self.figure.title.text = f"{panel.name} / {panel.unit}" if panel.unit else panel.name
         low, high = panel.limits
-        self.mapper.update(low=low, high=high, palette=PALETTES[panel.colours])
+        self.mapper.update(low=low, high=high)
+        # Bokeh checks each of 256 colours, which takes longer than all else.
+        if self._colours != panel.colours:
+            self._colours = panel.colours
+            self.mapper.palette = PALETTES[panel.colours]
         if self._shown is panel.values:
             return
         self._shown = panel.values

@@ -80,7 +80,8 @@ _GRID: Final = {
 
 _TABLE_STYLE: Final = """
 .tabulator, .tabulator .tabulator-header, .tabulator .tabulator-header .tabulator-col,
-.tabulator .tabulator-tableholder .tabulator-table, .tabulator-row, .tabulator-row.tabulator-row-even
+.tabulator .tabulator-tableholder .tabulator-table,
+.tabulator-row, .tabulator-row.tabulator-row-even
 { background: transparent !important; color: inherit !important; }
 .tabulator-row.tabulator-selected
 { background: color-mix(in srgb, currentColor 15%, transparent) !important; }
@@ -395,7 +396,7 @@ class Measuring:
         self._isotherm = _number("Isotherm / °C")
         options = {label: name for name, label in _LABELS.items()}
         self._palette = pn.widgets.Select(
-            name="Palette", options=options, value=self._view.palette, width=130
+            label="Palette", options=options, value=self._view.palette, width=130
         )
         for widget in (self._low, self._high, self._isotherm, self._palette):
             widget.param.watch(lambda _: self._later(self._on_view), "value")
@@ -428,7 +429,7 @@ class Measuring:
         self._figures = (time, along, self._frequency)
 
     def _buttons(self) -> list[Any]:
-        copy = pn.widgets.Button(name="Copy table", width=110)
+        copy = pn.widgets.Button(label="Copy table", width=110)
         copy.js_on_click(
             args={"source": self._copied}, code="navigator.clipboard.writeText(source.data.text[0])"
         )
@@ -457,7 +458,7 @@ def _mapper(one: Any) -> LinearColorMapper:
 
 
 def _number(name: str, value: float | None = None) -> Any:
-    return pn.widgets.FloatInput(name=name, value=value, width=110)
+    return pn.widgets.FloatInput(label=name, value=value, width=110)
 
 
 def _table_widget() -> Any:
@@ -515,5 +516,4 @@ def _pane(one: Any) -> Any:
 def _download(label: str, filename: str, make: Callable[[], bytes]) -> Any:
     return pn.widgets.FileDownload(
         callback=lambda: BytesIO(make()), filename=filename, label=label, width=130,
-        button_type="default",
     )  # fmt: skip

@@ -42,8 +42,9 @@ from chipglow.io import (
     open_measurement,
     open_scene,
 )
+from chipglow.io.cameras.formats import load_libraries
 from chipglow.io.measurement_file import holds
-from chipglow.io.sandbox import ReaderProcess
+from chipglow.io.sandbox import ReaderProcess, Sandbox
 from chipglow.laboratory.emissivity import PlacesDescription, is_places, load_places
 from chipglow.laboratory.recordings import StoredFrames
 from chipglow.quantities import Array, unchecked
@@ -247,7 +248,8 @@ class OpenFiles:
 
     def warm(self) -> None:
         """Prepare to open a file, so that the first one takes no longer than others."""
-        self.process.start()
+        with self.process.used():
+            Sandbox("reader").answer(load_libraries)
         band = Study().camera.build().band
         band.temperature(band.radiance(np.full((2, 2), 600.0)))  # K: loads compiled kernels
 

@@ -753,13 +753,16 @@ class MeasurementModel(_FramesModel):
 
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the numbers at the cursor in K, with the calibration's uncertainty if known."""
-        measurement = self.measured.measurement(self.frame(picture.state))
-        data = picture.data
-        if measurement.calibration_errors is not None:
-            effects = measurement.calibration_effects(0)[None]
-            estimate = measurement.estimate(data["measured"].values[None], effects)
-            data = data.assign(uncertainty=(("y", "x"), estimate.standard_uncertainty[0]))
-        return _at(data, picture.raster, picture.state.cursor)
+        numbers = _at(picture.data, picture.raster, picture.state.cursor)
+        frame = self.measured.measurement(self.frame(picture.state))
+        if frame.calibration_errors is not None:
+            row, column = _pixel(picture.raster, picture.state.cursor)
+            pixel = Measurement(frame.data.isel(y=[row], x=[column]))
+            pixel.band = frame.band  # which has its table of radiance already
+            values = np.full((1, 1, 1), numbers["measured"])
+            estimate = pixel.estimate(values, pixel.calibration_effects(0)[None])
+            numbers["uncertainty"] = float(estimate.standard_uncertainty[0, 0, 0])
+        return numbers
 
 
 @dataclass(eq=False)
@@ -949,6 +952,13 @@ def _corrected_line(picture: Picture, corrected: Corrected | None, name: str) ->
         for key, variable in _LINE_OF.items()
         if variable in data
     }
+
+
+def _pixel(raster: Raster, at: tuple[float, float]) -> tuple[int, int]:
+    """Return row and column of the pixel at x and y in m."""
+    row = int((raster.top - at[1]) / raster.spacing)
+    column = int((at[0] - raster.left) / raster.spacing)
+    return min(max(row, 0), raster.rows - 1), min(max(column, 0), raster.columns - 1)
 
 
 def _at(data: xr.Dataset, raster: Raster, at: tuple[float, float]) -> dict[str, float]:

@@ -98,10 +98,6 @@ class Sandbox:
             if process.poll() is None:
                 return process
             _end(process)  # the system ended it while it waited
-        return self.started()
-
-    def started(self) -> "subprocess.Popen[bytes]":
-        """Return a new process that waits for a job."""
         process = _started()
         try:
             self._in_time(process, STARTING)
@@ -178,11 +174,6 @@ class ReaderProcess:
 
     def __init__(self) -> None:
         self._waiting: list[subprocess.Popen[bytes]] = []
-
-    def start(self) -> None:
-        """Start the process before it is needed."""
-        if not self._waiting:
-            self._waiting.append(Sandbox("reader").started())
 
     @contextmanager
     def used(self) -> Iterator[None]:

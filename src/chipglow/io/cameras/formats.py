@@ -232,3 +232,11 @@ def _times_here(path: Path, kind: str, stated: Stated) -> Array:
         if one.read is not None:
             return one.read(path, None, stated.interval).times
         return stack_times(path, one.suffixes[0], stated)
+
+
+def load_libraries() -> list[str]:
+    """Import the libraries of frequent formats, which takes seconds, and return their names."""
+    import h5py
+    import tifffile
+
+    return [h5py.__name__, tifffile.__name__]
