@@ -33,6 +33,7 @@ def main(folder):
         if folder is None:
             take(browser, url, SIZES[0], "light", HERE / "app.png")
             take_correction(browser, url, HERE / "app-correction.png")
+            take_measuring(browser, url, HERE / "app-measure.png")
         else:
             for size in SIZES:
                 for theme in ("light", "dark"):
@@ -67,6 +68,57 @@ def take_correction(browser, url, file):
     page.wait_for_timeout(1000)
     page.screenshot(path=file)
     page.close()
+
+
+def take_measuring(browser, url, file):
+    """Take the picture of places that are drawn on the images, and what they measure."""
+    width, _ = SIZES[0]
+    page = browser.new_page(viewport={"width": width, "height": 1150}, color_scheme="light")
+    page.set_default_timeout(180_000)
+    page.goto(url)
+    page.locator("#status", has_text="Exact picture").wait_for()
+
+    def choose(tool):
+        page.get_by_role("button", name=tool, exact=True).click()
+
+    def drag(*points):
+        for number, (x, y) in enumerate(points):
+            page.mouse.move(*place(page, x, y))
+            if number == 0:
+                page.mouse.down()
+        page.mouse.up()
+        page.wait_for_timeout(1000)
+
+    choose("Box")
+    drag((-330, 160), (-270, 220), (-210, 280))
+    choose("Circle")
+    drag((-120, 330), (-100, 345), (-80, 360))
+    choose("Line")
+    drag((-350, 120), (-200, 220), (-40, 330))
+    choose("Point")
+    page.mouse.click(*place(page, -60, 120))
+    page.wait_for_function(
+        "() => Bokeh.documents[0].get_model_by_name('over_time').data.name.length === 4"
+    )
+    isotherm = page.get_by_label("Isotherm / °C")
+    isotherm.fill("300")
+    isotherm.press("Enter")
+    page.wait_for_timeout(2000)
+    page.screenshot(path=file)
+    page.close()
+
+
+def place(page, x, y):
+    """Return where a point of the measured image in µm is on the screen."""
+    return page.evaluate(
+        """([x, y]) => {
+          const model = Bokeh.documents[0].get_model_by_name("measured_figure");
+          const view = Bokeh.index.find_one_by_id(model.id);
+          const box = view.canvas_view.el.getBoundingClientRect();
+          return [box.x + view.frame.x_scale.compute(x), box.y + view.frame.y_scale.compute(y)];
+        }""",
+        [x, y],
+    )
 
 
 if __name__ == "__main__":

@@ -22,12 +22,13 @@ from panel.custom import Child, Children, JSComponent
 from chipglow import __version__
 from chipglow.analysis.attribution import AttributionReference
 from chipglow.analysis.images import PARTS
+from chipglow.app.asking import description_path
 from chipglow.app.controls import CORRECTION, ERROR_IMAGES, WHOLE, Texts, rounded
 from chipglow.app.figures import TEXT, Figures
 from chipglow.app.measuring import Measuring
 from chipglow.app.opened import Opened
 from chipglow.app.opening import MOST_UPLOADED, OpenFiles
-from chipglow.app.pictures import Drawn, Model, Picture, SceneModel
+from chipglow.app.pictures import Drawn, MeasurementModel, Model, Picture, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.quantities.format import quantity_text, readable, rounded_text, uncertain_decimals
@@ -229,8 +230,11 @@ class PageView:
         from chipglow.app.files import measurement_file, study_file
 
         model, picture = self.session.model, self._picture
-        assert isinstance(model, SceneModel)
-        if name == "study.yaml":
+        if isinstance(model, MeasurementModel):
+            data = model.description.encode()
+        elif not isinstance(model, SceneModel):
+            return
+        elif name == "study.yaml":
             data = study_file(model, self.session.state)
         elif picture is None or picture.quick or picture.state != self.session.state:
             self._say("The exact picture is not ready; save again when it is shown.", "error")
@@ -446,12 +450,19 @@ def _html(opened: Model, figures: Figures, may_upload: bool, embedded: bool) -> 
         spec=spec,
         name=opened.name,
         scene=opened.scene if isinstance(opened, SceneModel) else None,
+        description=_description_name(opened),
         may_upload=may_upload,
         groups={row.group: [one for one in rows if one.group == row.group] for row in rows},
         images={name: one.figure.title.text for name, one in figures.images.items()},
         lines={name: one.figure.title.text for name, one in figures.lines.items()},
         draws=f"{PHASES}² positions of the pixels, {TEXTURES} textures",
     )
+
+
+def _description_name(opened: Model) -> str:
+    """Return the name under which the settings of a camera file are saved; empty without any."""
+    has_settings = isinstance(opened, MeasurementModel) and bool(opened.description)
+    return description_path(Path(opened.name)).name if has_settings else ""
 
 
 def _texts(numbers: Mapping[str, float]) -> dict[str, str]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import IO, Any, Final, TypeAlias, TypeVar
+from weakref import finalize
 
 from chipglow.io.answers import (
     ANSWER,
@@ -174,6 +175,8 @@ class ReaderProcess:
 
     def __init__(self) -> None:
         self._waiting: list[subprocess.Popen[bytes]] = []
+        self.close = finalize(self, _end_all, self._waiting)
+        """Ends the process; so does the end of this object."""
 
     @contextmanager
     def used(self) -> Iterator[None]:
@@ -184,10 +187,10 @@ class ReaderProcess:
         finally:
             _KEPT.reset(token)
 
-    def close(self) -> None:
-        """End the process."""
-        while self._waiting:
-            _end(self._waiting.pop())
+
+def _end_all(waiting: "list[subprocess.Popen[bytes]]") -> None:
+    while waiting:
+        _end(waiting.pop())
 
 
 @contextmanager
