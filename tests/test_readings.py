@@ -125,7 +125,11 @@ def test_curves_are_the_statistics_of_every_frame():
     steps = np.array([0.0, 10.0, -5.0])
     frames = ramp()[None] + steps[:, None, None]
     frames[1, 20, 12] = np.nan
-    curves = place_curves(lambda one: frames[one], np.arange(3.0), RASTER, [BOX, POINT])
+    done = []
+    curves = place_curves(
+        lambda one: frames[one], np.arange(3.0), RASTER, [BOX, POINT], done.append
+    )
+    assert done == pytest.approx([1 / 3, 2 / 3, 1])
     assert curves.places == ("box", "point")
     expected = 600 + 2 * 12 - 20 + steps
     np.testing.assert_array_equal(curves.mean[1], np.where([0, 1, 0], np.nan, expected))

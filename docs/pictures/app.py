@@ -12,10 +12,17 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+import chipglow
+from chipglow.study import fit
 
 HERE = Path(__file__).parent
 CHROMIUM = os.environ.get("CHIPGLOW_CHROMIUM") or shutil.which("chromium")
 FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking")
+FRAMES = 12
 SIZES = ((1280, 800), (1920, 1080))
 
 
@@ -33,7 +40,7 @@ def main(folder):
         if folder is None:
             take(browser, url, SIZES[0], "light", HERE / "app.png")
             take_correction(browser, url, HERE / "app-correction.png")
-            take_measuring(browser, url, HERE / "app-measure.png")
+            take_measuring(browser, HERE / "app-measure.png")
         else:
             for size in SIZES:
                 for theme in ("light", "dark"):
@@ -70,13 +77,35 @@ def take_correction(browser, url, file):
     page.close()
 
 
-def take_measuring(browser, url, file):
-    """Take the picture of places that are drawn on the images, and what they measure."""
+def take_measuring(browser, file):
+    """Take the picture of places on frames of a camera, and what they measure."""
+    with TemporaryDirectory() as folder:
+        measurement = Path(folder, "chip.nc")
+        chipglow.write_measurement(frames(), measurement)
+        command = [sys.executable, "-m", "chipglow", "app", str(measurement), "--no-browser"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, encoding="utf-8") as server:
+            url = re.search(r"http://\S+", server.stdout.readline())[0]
+            draw_places(browser, url, file)
+            server.terminate()
+
+
+def frames():
+    """Return frames of the paper's camera and its first chip, on the scene of the app."""
+    study, scene = chipglow.Study(), chipglow.example_scene()
+    fitted = fit(study, scene)
+    camera = study.camera.on(fitted.scene.raster, study.seed)
+    first, *_, last = fitted.scene.times
+    starts = np.linspace(first, last - camera.frame_duration(fitted.scene.raster), FRAMES)
+    return camera.measure(fitted.scene, next(iter(fitted.surfaces.values())), starts)
+
+
+def draw_places(browser, url, file):
+    """Draw places on the page of a measurement and take its picture."""
     width, _ = SIZES[0]
-    page = browser.new_page(viewport={"width": width, "height": 1150}, color_scheme="light")
+    page = browser.new_page(viewport={"width": width, "height": 1300}, color_scheme="light")
     page.set_default_timeout(180_000)
     page.goto(url)
-    page.locator("#status", has_text="Exact picture").wait_for()
+    page.locator("#status", has_text="Measured image").wait_for()
 
     def choose(tool):
         page.get_by_role("button", name=tool, exact=True).click()
@@ -90,20 +119,23 @@ def take_measuring(browser, url, file):
         page.wait_for_timeout(1000)
 
     choose("Box")
-    drag((-330, 160), (-270, 220), (-210, 280))
+    drag((-75, 90), (-40, 130), (-5, 170))
     choose("Circle")
-    drag((-120, 330), (-100, 345), (-80, 360))
+    drag((-40, 260), (-20, 270), (0, 280))
     choose("Line")
-    drag((-350, 120), (-200, 220), (-40, 330))
+    drag((-150, 60), (-60, 180), (20, 330))
     choose("Point")
-    page.mouse.click(*place(page, -60, 120))
+    page.mouse.click(*place(page, -20, 30))
     page.wait_for_function(
         "() => Bokeh.documents[0].get_model_by_name('over_time').data.name.length === 4"
     )
     isotherm = page.get_by_label("Isotherm / °C")
-    isotherm.fill("300")
+    isotherm.fill("500")
     isotherm.press("Enter")
     page.wait_for_timeout(2000)
+    page.mouse.move(0, 0)
+    page.evaluate("scrollTo(0, 0)")
+    page.wait_for_timeout(500)
     page.screenshot(path=file)
     page.close()
 

@@ -25,6 +25,7 @@ from chipglow.app.export import csv_file, picture_file, workbook
 from chipglow.app.figures import MICRONS, TEXT
 from chipglow.app.marks import Kind, Mark, marks_of, new_name, places_text
 from chipglow.app.opened import Opened
+from chipglow.app.pictures import SceneFrames
 from chipglow.app.reading import MEASURED, Reader, table_of
 from chipglow.app.session import PAUSE, Newest
 from chipglow.app.tools import DrawnPlaces, colour_of
@@ -99,10 +100,7 @@ class Measuring:
     """
 
     def __init__(
-        self,
-        opened: Opened,
-        later: Callable[[Callable[[], None]], None],
-        say: Callable[[str, str], None],
+        self, opened: Opened, later: Callable[[Callable[[], None]], None], say: Callable[..., None]
     ) -> None:
         self._opened, self._later, self._say = opened, later, say
         self._marks: list[Mark] = []
@@ -266,19 +264,30 @@ class Measuring:
         self._counted = found.to_frame()
 
     def _ask_curves(self) -> None:
-        times = self._opened.frames.times
-        self._now.location = float(MICRONS * times[self._opened.frame])
-        if len(times) > 1 and self._marks:
+        """Read the frames of a recording; those of a scene, which take long, when asked for."""
+        frames = self._opened.frames
+        self._now.location = float(MICRONS * frames.times[self._opened.frame])
+        is_scene, several = isinstance(frames, SceneFrames), len(frames.times) > 1
+        self._compute.visible = is_scene and several and bool(self._marks)
+        if several and self._marks and not is_scene:
             self._work.ask(tuple(self._marks))
         else:
+            self._work.cancel()
             self._show_curves(None, ())
 
     def _read_curves(self, marks: tuple[Mark, ...]) -> None:
         """Read places in all frames, in a thread of its own."""
-        if self._opened.measured is not None:
-            self._work.pause(PAUSE)
-        curves = self._reader.curves(marks, self._work.check)
+        self._work.pause(PAUSE)
+        curves = self._reader.curves(marks, self._check_frame)
         self._later(lambda: self._show_curves(curves, marks))
+
+    def _check_frame(self, done: float) -> None:
+        """Stop reading frames that are no longer needed, and say how many of a scene are read."""
+        self._work.check()
+        if isinstance(self._opened.frames, SceneFrames):
+            text, kind = ("Frames are measured.", "busy") if done < 1 else ("", "")
+            progress = {"progress": done} if done < 1 else {}
+            self._later(lambda: self._say(text, kind, **progress))
 
     def _show_curves(self, curves: PlaceCurves | None, marks: tuple[Mark, ...]) -> None:
         self._curves = curves
@@ -400,6 +409,8 @@ class Measuring:
         )
         for widget in (self._low, self._high, self._isotherm, self._palette):
             widget.param.watch(lambda _: self._later(self._on_view), "value")
+        self._compute = pn.widgets.Button(label="Measure all frames", visible=False, width=150)
+        self._compute.on_click(lambda _: self._work.ask(tuple(self._marks)))
         self._copied = ColumnDataSource({"text": [""]})
         self._build_figures()
         self.tools = pn.pane.Bokeh(self._drawn.choice, margin=0)
@@ -407,6 +418,7 @@ class Measuring:
             self._hint,
             self._rows,
             self._warnings,
+            self._compute,
             pn.Column(*(_pane(one) for one in self._figures), styles=_GRID),
             pn.FlexBox(self._low, self._high, self._palette, self._isotherm),
             pn.FlexBox(*self._buttons()),

@@ -140,8 +140,8 @@ class Reader:
         """Return the lines of a temperature in K."""
         return isotherm(self.kelvins, self.raster, level)
 
-    def curves(self, marks: Sequence[Mark], check: Callable[[], None]) -> PlaceCurves:
-        """Return the temperatures of places over all frames."""
+    def curves(self, marks: Sequence[Mark], check: Callable[[float], None]) -> PlaceCurves:
+        """Return the temperatures of places over all frames; `check` takes the fraction read."""
         frames = self._opened.frames
         places = [mark.region for mark in marks]
         return place_curves(frames.kelvins, frames.times, frames.raster, places, check)

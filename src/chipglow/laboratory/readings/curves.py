@@ -52,7 +52,7 @@ def place_curves(
     times: Array,
     raster: Raster,
     places: Sequence[Region],
-    check: Callable[[], None] | None = None,
+    check: Callable[[float], None] | None = None,
 ) -> PlaceCurves:
     """Read places in every frame.
 
@@ -68,19 +68,20 @@ def place_curves(
     places : sequence of Region
         Regions, points and lines.
     check : callable, optional
-        Called before each frame. An exception raised here stops the reading.
+        Called with the completed fraction after each frame. An exception raised here stops the
+        reading.
     """
     masks = [place.mask(raster) for place in places]
     values = np.full((3, len(places), len(times)), np.nan)
     for frame in range(len(times)):
-        if check is not None:
-            check()
         image = kelvins(frame)
         for number, mask in enumerate(masks):
             pixels = image[mask]
             known = pixels[np.isfinite(pixels)]
             if known.size:
                 values[:, number, frame] = known.mean(), known.min(), known.max()
+        if check is not None:
+            check((frame + 1) / len(times))
     names = tuple(place.name for place in places)
     return PlaceCurves(np.asarray(times, np.float64), names, *values)
 
