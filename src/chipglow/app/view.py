@@ -461,8 +461,11 @@ def _html(opened: Model, figures: Figures, may_upload: bool, embedded: bool) -> 
 
 def _description_name(opened: Model) -> str:
     """Return the name under which the settings of a camera file are saved; empty without any."""
-    has_settings = isinstance(opened, MeasurementModel) and bool(opened.description)
-    return description_path(Path(opened.name)).name if has_settings else ""
+    if not (isinstance(opened, MeasurementModel) and opened.description):
+        return ""
+    name = Path(opened.name)
+    is_description = name.suffix.lower() in (".yaml", ".yml")
+    return name.name if is_description else description_path(name).name
 
 
 def _texts(numbers: Mapping[str, float]) -> dict[str, str]:

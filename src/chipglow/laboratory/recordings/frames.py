@@ -1,5 +1,6 @@
 """Frames of a measurement that are read one by one."""
 
+from abc import ABC, abstractmethod
 from collections import OrderedDict
 from dataclasses import replace
 from pathlib import Path
@@ -20,13 +21,16 @@ _KEPT: Final = 8
 """Frames that are kept: one who looks at a few needs no file."""
 
 
-class StoredFrames:
-    """Frames of a measurement whose data are in memory, or are read by xarray."""
+class _Frames(ABC):
+    """Frames that are read when they are asked for; the last ones are kept."""
 
-    def __init__(self, measurement: Measurement) -> None:
-        self.first = Measurement(measurement.data.isel(time=[0]).load())
-        self.times: Array = measurement.times
-        self._data = measurement.data
+    first: Measurement
+    times: Array
+    """Start of each frame in s."""
+
+    def __init__(self) -> None:
+        self._turn = RLock()
+        self._kept: OrderedDict[int, Measurement] = OrderedDict()
 
     @property
     def raster(self) -> Raster:
@@ -40,15 +44,38 @@ class StoredFrames:
 
     @property
     def notes(self) -> Notes:
-        """Assumptions and warnings."""
+        """Assumptions and warnings of the first frame."""
         return self.first.notes
 
     def measurement(self, index: int) -> Measurement:
         """Return one frame."""
+        with self._turn:
+            if index not in self._kept:
+                self._kept[index] = self._read(index)
+            self._kept.move_to_end(index)
+            if len(self._kept) > _KEPT:
+                self._kept.popitem(last=False)
+            return self._kept[index]
+
+    @abstractmethod
+    def _read(self, index: int) -> Measurement:
+        """Read one frame."""
+
+
+class StoredFrames(_Frames):
+    """Frames of a measurement whose data are in memory, or are read by xarray."""
+
+    def __init__(self, measurement: Measurement) -> None:
+        super().__init__()
+        self.times = measurement.times
+        self._data = measurement.data
+        self.first = self.measurement(0)
+
+    def _read(self, index: int) -> Measurement:
         return Measurement(self._data.isel(time=[index]).load())
 
 
-class CameraFrames:
+class CameraFrames(_Frames):
     """Frames of a camera file, each read and converted when it is asked for.
 
     Parameters
@@ -69,9 +96,9 @@ class CameraFrames:
     def __init__(
         self, description: MeasurementDescription, name: str, process: ReaderProcess | None = None
     ) -> None:
+        super().__init__()
         self._description, self._name = description, name
-        self._process, self._turn = process or ReaderProcess(), RLock()
-        self._read: OrderedDict[int, Measurement] = OrderedDict()
+        self._process = process or ReaderProcess()
         chosen = description.chosen_frames() or slice(None)
         start = chosen.start or 0
         # The first frame alone: its errors name all settings that are missing.
@@ -80,33 +107,11 @@ class CameraFrames:
             stated = made_from(Stated, description)
             times = recording_times(Path(str(description.file)), description.format, stated)
         self._numbers = range(len(times))[chosen]
-        self.times: Array = times[chosen]
-        self._read[0] = self.first
+        self.times = times[chosen]
+        self._kept[0] = self.first
 
-    @property
-    def raster(self) -> Raster:
-        """Grid of the pixels."""
-        return self.first.raster
-
-    @property
-    def tool(self) -> Tool | None:
-        """The tool in the measurement's coordinates."""
-        return self.first.tool
-
-    @property
-    def notes(self) -> Notes:
-        """Assumptions and warnings of the first frame."""
-        return self.first.notes
-
-    def measurement(self, index: int) -> Measurement:
-        """Return one frame; the last ones are kept."""
-        with self._turn:
-            if index not in self._read:
-                self._read[index] = self._converted(self._numbers[index])
-            self._read.move_to_end(index)
-            if len(self._read) > _KEPT:
-                self._read.popitem(last=False)
-            return self._read[index]
+    def _read(self, index: int) -> Measurement:
+        return self._converted(self._numbers[index])
 
     def close(self) -> None:
         """End the process that reads the file, if there is one."""
