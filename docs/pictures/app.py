@@ -102,7 +102,7 @@ def frames():
 def draw_places(browser, url, file):
     """Draw places on the page of a measurement and take its picture."""
     width, _ = SIZES[0]
-    page = browser.new_page(viewport={"width": width, "height": 1300}, color_scheme="light")
+    page = browser.new_page(viewport={"width": width, "height": 1500}, color_scheme="light")
     page.set_default_timeout(180_000)
     page.goto(url)
     page.locator("#status", has_text="Measured image").wait_for()

@@ -47,7 +47,9 @@ def explore(scene: "Scene | str | Path | None" = None, study: "Study | None" = N
             f"{opened.path}: is neither a scene nor a measurement; convert it by chipglow convert "
             "or import, or open it in chipglow app"
         )
-    pn.extension(inline=True)  # its scripts come with it: nothing is loaded from the network
+    pn.extension(
+        "tabulator", inline=True
+    )  # its scripts come with it: nothing is loaded from the network
     view = PageView(opened, embedded=True)
     view.start(None)
     return view.page

@@ -173,8 +173,8 @@ def open_app(
         Path | None,
         opt.argument(
             "[PATH]",
-            "Scene or measurement (NetCDF), camera file, file of another program, study (YAML) or "
-            "results folder. Default: a small bundled scene.",
+            "Scene or measurement (NetCDF), camera file, file of another program, study or "
+            "session (YAML), or results folder. Default: a small bundled scene.",
             show_default=False,
         ),
     ] = None,
