@@ -159,6 +159,7 @@ class Line:
         )  # fmt: skip
         *others, self.corrected_item = one.legend[0].items
         self.reference_item = others[0] if with_reference else None
+        self.measured_item = others[-1]
         self.corrected_item.visible = False
         one.add_layout(one.legend[0], "above")
         one.add_tools(HoverTool(tooltips=tips, mode="vline", renderers=drawn[-1:]))
@@ -183,6 +184,8 @@ class Line:
         self.corrected.visible = self.corrected_item.visible = is_shown
         label = "corrected" if is_known else "second camera"
         self.corrected_item.label = {"value": label}
+        first = "first camera" if is_shown and not is_known else "measured"
+        self.measured_item.label = {"value": first}
         if self.reference_item is not None:
             self.reference_item.label = {"value": "true" if is_known else "reference"}
             self.reference_item.visible = is_known or not is_shown

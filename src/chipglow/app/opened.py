@@ -75,19 +75,27 @@ class Opened:
     """The frame's correction, if it is shown."""
     reflected: float | None = field(init=False, default=None)
     """Temperature of the reflected surroundings in K, if the page states it."""
+    _shown: Any = field(init=False, default=None, repr=False)
+    _panels: Mapping[str, Panel] = field(init=False, default_factory=dict, repr=False)
+    """Kept, so that no other arrays have their places in memory."""
     _listeners: list[Callable[[], None]] = field(init=False, default_factory=list, repr=False)
 
     def watch(self, listener: Callable[[], None]) -> None:
-        """Call a function after each change of `images`, in the thread of the page."""
+        """Call a function after each change of what is shown, in the thread of the page."""
         self._listeners.append(listener)
 
     def show(
         self, picture: Picture, frames: Frames, frame: int, measured: Measurement | None
     ) -> None:
         """Take the images of an exact picture, all frames, and the index and data of its frame."""
+        reflected = picture.state.study.camera.reflected
+        shown = frame, reflected, {name: id(one.values) for name, one in picture.panels.items()}
+        if shown == self._shown:  # the cursor moved
+            return
+        self._shown, self._panels = shown, picture.panels
         self.images = {name: ShownImage.of(panel) for name, panel in picture.panels.items()}
         self.frames, self.frame = frames, frame
         self.measured, self.corrected = measured, picture.corrected
-        self.reflected = picture.state.study.camera.reflected
+        self.reflected = reflected
         for listener in self._listeners:
             listener()

@@ -158,13 +158,18 @@ class Session:
             picture = model.picture(state, check=work.check)
             self._send(picture)
             work.check()
-        else:
+        elif isinstance(model, SceneModel):
             picture = model.picture(state)
             self._send(picture)
             # The numbers of a large scene take longer than its picture: a newer state goes first.
             work.pause(PAUSE if model.coarse else 0.0)
-        numbers = model.numbers(picture)
-        self._notify("numbers", picture, numbers, {})
+        else:  # frames of a file: the page draws picture and numbers once
+            picture = model.picture(state)
+            numbers = model.numbers(picture)
+            self._send(picture, numbers)
+        if isinstance(model, SceneModel):
+            numbers = model.numbers(picture)
+            self._notify("numbers", picture, numbers, {})
         if state.study.images == CORRECTION:
             self._correct(picture, numbers)
         elif state.second is not None:
@@ -190,12 +195,12 @@ class Session:
         self._send(corrected)
         self._notify("numbers", corrected, numbers, {})
 
-    def _send(self, picture: Picture) -> None:
-        """Send a picture as soon as the page has painted the one before."""
+    def _send(self, picture: Picture, *numbers: dict[str, float]) -> None:
+        """Send a picture, with its numbers if known, when the page has painted the one before."""
         self._painted.wait(_PAINT_TIMEOUT)
         self._painted.clear()
         self._sent += 1
-        self._notify("picture", self._sent, picture)
+        self._notify("picture", self._sent, picture, *numbers)
 
     def _draw(self, state: State) -> None:
         def progress(done: float) -> None:

@@ -258,7 +258,9 @@ class PageView:
 
     # Messages to the page
 
-    def _show_picture(self, number: int, picture: Picture) -> None:
+    def _show_picture(
+        self, number: int, picture: Picture, numbers: dict[str, float] | None = None
+    ) -> None:
         self._picture = picture
         self.figures.show(picture)
         if not picture.quick:
@@ -272,6 +274,8 @@ class PageView:
         content = {"number": number, "lines": lines, "absent": picture.absent}
         content["images"] = list(picture.panels)
         self._send("picture", content | {"quick": picture.quick})
+        if numbers is not None:
+            self._show_numbers(picture, numbers, {})
 
     def _described(self, picture: Picture) -> tuple[str, str]:
         """Return the status of the page with a picture, and its kind."""
