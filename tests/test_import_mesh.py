@@ -11,7 +11,7 @@ from plane_mesh import HEIGHT, RASTER, WIDTH, X, Y, only_frame, temperature
 from tolerances import SINGLE
 
 from chipglow.io.importing import Import, prospect
-from chipglow.io.sandbox import Isolated
+from chipglow.io.sandbox import Isolated, Sandbox
 from chipglow.io.sources import Placement, SourceError, Units
 from chipglow.io.sources.meshes.mesh import MeshSource
 from chipglow.quantities.units import CELSIUS, Unit, parse_unit
@@ -585,7 +585,7 @@ def test_a_header_that_claims_more_than_memory_holds_is_one_error(tmp_path):
     grid_of().save(path)
     path.write_bytes(path.read_bytes().replace(b'Points="70"', b'Points="70000000000"'))
     with pytest.raises(SourceError, match=r"chip: .*damaged"):
-        Isolated(MeshSource(path), "chip").survey()
+        Isolated(MeshSource(path), Sandbox("chip")).survey()
 
 
 def test_elements_of_nodes_that_do_not_exist(tmp_path):

@@ -75,7 +75,7 @@ CHIP = ChipMetrics(
 )
 FORCES = CuttingForces(
     history=CutHistory(
-        *[np.zeros(1)] * 4,
+        **dict.fromkeys(("time", "cutting", "thrust", "thickness"), np.zeros(1)),
         start=0.0,
         cutting_mean=625e3,
         cutting_swing=174e3,

@@ -30,7 +30,7 @@ from chipglow.laboratory.emissivity.observations import (
 )
 from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 from chipglow.quantities.units import HOTTEST
-from chipglow.radiometry import Band
+from chipglow.radiometry import Band, blackbody_radiance
 from chipglow.scene import Area, Region, areas
 from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Estimate, Limits, MonteCarlo, monte_carlo, propagate
@@ -362,8 +362,7 @@ def _mean_radiance(
 
 def _temperature(emissivity: ArrayLike, reflected: ArrayLike, band: Band, radiance: Array) -> Array:
     """Return the true temperature in K by apparent radiance in W/(m² sr): Equation 2."""
-    emissivity, room = np.asarray(emissivity), band.radiance(np.asarray(reflected))
-    own = (radiance - (1 - emissivity) * room) / emissivity
+    own = blackbody_radiance(radiance, emissivity, band.radiance(np.asarray(reflected)))
     return np.asarray(band.temperature(own), np.float64)
 
 
