@@ -16,7 +16,7 @@ from chipglow.chip.segmentation import (
     resolution,
     segmentation,
 )
-from chipglow.chip.shear_band import ShearBand
+from chipglow.chip.shear_band import MIDDLE_HALF, ShearBand
 from chipglow.quantities import ROUNDING, Array, Brief
 from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
@@ -186,7 +186,7 @@ def _passing(
     if not windows:
         return {"thickness": nan, "band_strain": nan, **_with_deviation("chip_speed", [])}
     valleys = [scan.thickness[window].min() for window in windows]
-    depth = np.linspace(0.25, 0.75, _CHIP_POINTS) * float(np.mean(valleys))
+    depth = np.linspace(*MIDDLE_HALF, _CHIP_POINTS) * float(np.mean(valleys))
     points = tool.rake_point(scan.height) + depth[:, None] * np.array(tool.rake_normal)
     right, up, strain = (
         np.stack([sample(scene.field(name, k), scene.raster, points) for k in frames])

@@ -38,6 +38,9 @@ samples across."""
 _WIDEST: Final = 80e-6
 """Largest half-width of a band in m."""
 
+MIDDLE_HALF: Final = (0.25, 0.75)
+"""Middle half of a length, as fractions of it."""
+
 _NO_RIDGE: Final = "shear band: no ridge of the plastic strain rate is off the rake face"
 
 
@@ -86,7 +89,7 @@ class ShearBand(Brief):
     def middle_half(self) -> NDArray[np.bool_]:
         """Which points are on the middle half of the curve, shape (n,)."""
         fraction = (self.ridge.distance - self.start) / self.length
-        return (fraction >= 0.25) & (fraction <= 0.75)
+        return (fraction >= MIDDLE_HALF[0]) & (fraction <= MIDDLE_HALF[1])
 
     def across(self, half_length: float, step: float) -> Line:
         """Return a line across the band's middle, from the workpiece to the chip."""

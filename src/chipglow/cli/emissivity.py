@@ -186,7 +186,9 @@ def temperature(
     named = lab.load_regions(regions)
     surroundings = None
     if reflected is not None or reflected_uncertainty is not None:
-        surroundings = lab.reflected_temperature(reflected or 293.0, reflected_uncertainty or 0.0)
+        surroundings = lab.reflected_temperature(
+            reflected or lab.LABORATORY, reflected_uncertainty or 0.0
+        )
     fitted = None if calibration is None else load_calibration(calibration)
     lines = emissivities_of(emissivity, emissivity_uncertainty)
     origin = lab.read_origin(emissivity) if isinstance(lines, dict) else None

@@ -47,6 +47,7 @@ VELOCITY_VALUES = SUMMED
 VELOCITY_X, VELOCITY_Y, CHANGE_X, CHANGE_Y = range(VELOCITY_VALUES)
 """A node's velocity after a step and its change in the step, in m/s."""
 
+# Their number and their names.
 SUMS = 9
 (
     FORCE_X, FORCE_Y, BOUNDARY_WORK, CONTACT_WORK, PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS,
