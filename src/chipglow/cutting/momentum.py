@@ -126,6 +126,7 @@ def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
     (vx, vy, dx, dy), (cxx, cyx, _, _), (cxy, cyy, _, _) = sum_nodes(
         velocity, i, j, wx, wy, _distances(ax), _distances(ay)
     )
+    # The weights of quadratic splines have a second moment of a quarter of a squared cell.
     scale = 4.0 * inverse
     p.vx, p.vy = vx, vy
     # In this order of the sums cuts stay the same to the last bit from version to version.
@@ -147,6 +148,7 @@ def _scatter(p, soft, tension, fx, fy, limit, nodes, grid, step):  # type: ignor
         return False
     wx, wy = spline_weights(ax), spline_weights(ay)
     mass = step.mass
+    # The second moment again.
     force = 4.0 * inverse * step.time_step * p.volume
     spread = mass * grid.cell
     qxx, qxy, qyx, qyy = spread * p.cxx, spread * p.cxy, spread * p.cyx, spread * p.cyy

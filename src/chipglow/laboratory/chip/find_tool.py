@@ -186,6 +186,7 @@ def _best_line(image: Array, angles: Array) -> tuple[Array, float]:
     middle = float(np.median(scores))
     spread = float(np.median(np.abs(scores - middle)))
     best = float(scores.max())
+    # Scores are up to 1; less than this is rounding.
     prominence = (best - middle) / max(spread, 1e-12)
     if not prominence > _MIN_PROMINENCE:
         raise _not_found("nothing stands out from the noise")

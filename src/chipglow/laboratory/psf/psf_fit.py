@@ -331,6 +331,7 @@ class _Problem:
         total, bins = 0.0, 0
         for edge, place, rows in zip(self.edges, self._split(vector)[1], self.rows, strict=True):
             part, distance = residual[rows], _line(place).distance(edge.x, edge.y)
+            # Bins of a quarter of a pitch, as of ISO 12233.
             index = np.floor((distance - distance.min()) / (edge.pitch / 4)).astype(np.int64)
             count = np.bincount(index)
             sums = np.bincount(index, part)

@@ -201,6 +201,7 @@ def _refined(times: Array, target: Array, spline: CubicSpline, begin: float) -> 
 
 def _chance(correlation: float, freedom: float, offsets: int) -> Iterator[str]:
     """Yield a warning if one of the offsets would have this correlation by chance."""
+    # Rounding of a full correlation.
     rest = max(1.0 - correlation**2, 1e-15)
     likely = 2 * float(stdtr(freedom, -abs(correlation) * np.sqrt(freedom / rest))) * offsets
     if likely >= _CHANCE_LEVEL:
