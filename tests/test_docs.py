@@ -37,6 +37,8 @@ def reader(tmp_path, quick_study, own_laws, read_here, undrawn, few_draws, monke
     for name in known:
         os.link(quick_study.cache / name, cache / name)
     monkeypatch.setenv("CHIPGLOW_CACHE", str(cache))
+    # A correction takes longer than the rest of a small study; that of the quick study is tested.
+    monkeypatch.setattr("chipglow.analysis.engine.corrected_windows", lambda *_: ())
     monkeypatch.setattr(plt, "show", lambda: None)
     matplotlib.use("Agg")
     yield Reader(folder, done=("chipglow reproduce --quick",))
