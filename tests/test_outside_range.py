@@ -86,7 +86,7 @@ def test_the_fraction_is_that_of_the_area(study, state):
     assert float(data.measured.sel(effects="all").squeeze()) == pytest.approx(expected, abs=1e-9)
 
 
-def test_error_report_budget_and_design_state_the_same_fraction(study, state):
+def test_error_report_budget_and_design_state_the_same_fraction(study, state, few_draws):
     said = sentence(state)
     analysis = errors(study)
     assert f"Pad (uniform): {said}." in analysis.warnings
