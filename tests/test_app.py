@@ -451,7 +451,7 @@ def test_what_is_saved_can_be_opened(model, tmp_path, reference):
         np.testing.assert_array_equal(
             seen.data[name].values[usable], picture.data[name].values[usable]
         )
-    assert again.images == ("measured", "error")
+    assert again.images == ("measured", "corrected", "half_width", "error")
     assert seen.panels["error"].name == picture.panels["error"].name == f"Error against {label}"
     np.testing.assert_array_equal(seen.panels["error"].values, picture.panels["error"].values)
     stored = xr.load_dataset(file).error[0].values

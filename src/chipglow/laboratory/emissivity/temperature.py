@@ -245,7 +245,8 @@ def true_temperatures(
     places = areas(regions, measurements[0].raster)
     if isinstance(emissivities, EmissivityLine):
         emissivities = dict.fromkeys((area.name for area in places), emissivities)
-    known = {area: emissivities[area.name] for area in places if area.name in emissivities}
+    named = {area: emissivities.get(area.name, emissivities.get(area.feature)) for area in places}
+    known = {area: line for area, line in named.items() if line is not None}
     if not known:
         raise ValueError(
             f"emissivity: no region ({', '.join(area.name for area in places)}) has the name or "
