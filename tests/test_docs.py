@@ -1,5 +1,6 @@
 """The documentation: its blocks of code run as a reader types them, and its pages are whole."""
 
+import json
 import os
 import re
 import shutil
@@ -245,6 +246,25 @@ def test_the_search_needs_no_server(site):
     index = (site / "searchindex.js").read_text(encoding="utf-8")
     assert index.startswith("Search.setIndex(")
     assert "learn/tutorial" in index
+
+
+ANSWERED = {
+    "true temperature": "do/correct",
+    "batch": "do/many-files",
+    "excel": "do/in-excel",
+    "matlab": "do/in-matlab",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", ANSWERED)
+def test_the_search_lists_first_the_page_that_answers(words, site):
+    """A main entry of the index that equals the query scores 100, a title at most 16, a word 5."""
+    script = (site / "searchindex.js").read_text(encoding="utf-8")
+    index = json.loads(script.removeprefix("Search.setIndex(").removesuffix(")"))
+    ((page, _, is_main),) = index["indexentries"][words]
+    assert is_main
+    assert index["docnames"][page] == ANSWERED[words]
 
 
 @pytest.mark.slow

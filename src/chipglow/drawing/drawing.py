@@ -93,11 +93,13 @@ def panels(figure: Figure, png: Path) -> tuple[list[Image], Image | None]:
     width, height = picture.size
     legends = [legend.get_window_extent().extents for legend in figure.legends]
     lefts: dict[int, float] = {}
-    for axes in figure.axes:
-        if spec := axes.get_subplotspec():
-            left, column = axes.get_tightbbox().x0, spec.colspan.start  # type: ignore[union-attr]
+    specs = {axes: axes.get_subplotspec() for axes in figure.axes}
+    first_column = min((spec.colspan.start for spec in specs.values() if spec), default=0)
+    for axes, spec in specs.items():
+        if spec and (column := spec.colspan.start) > first_column:
+            left = axes.get_tightbbox().x0  # type: ignore[union-attr]
             lefts[column] = min(left, lefts.get(column, left))
-    cuts = [0, *(floor(lefts[column]) - _MARGIN for column in sorted(lefts)[1:]), width]
+    cuts = [0, *(floor(lefts[column]) - _MARGIN for column in sorted(lefts)), width]
     below = round(height - max((top for *_, top in legends), default=0.0))
     _, first, _, _ = _content(picture)
     columns = [picture.crop((left, first, right, below)) for left, right in pairwise(cuts)]
