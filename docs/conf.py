@@ -8,6 +8,7 @@ HERE = Path(__file__).parent
 GENERATED = HERE / "generated"
 sys.path.insert(0, str(HERE))  # for mathml, field_tables and sample_files
 
+from example_figures import use_panels  # noqa: E402
 from field_tables import field_tables  # noqa: E402
 from sample_files import SAMPLES, write_archive  # noqa: E402
 
@@ -123,6 +124,7 @@ def restore_plain(app, what, name, obj, options, lines):
 
 
 def setup(app):
-    """Surround Napoleon, whose priority is 500."""
+    """Surround Napoleon, whose priority is 500, and follow the gallery, which has the same."""
+    app.connect("builder-inited", use_panels, priority=600)
     app.connect("autodoc-process-docstring", keep_plain, priority=400)
     app.connect("autodoc-process-docstring", restore_plain, priority=600)

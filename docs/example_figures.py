@@ -1,12 +1,25 @@
 """How the gallery takes an example's figures, and in which order it shows the examples."""
 
+import shutil
 from pathlib import Path
 from typing import Any, Final
 
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 from sphinx_gallery.scrapers import figure_rst
 
 DOTS_PER_INCH: Final = 130
+PANELS: Final = "panels"
+THUMBNAIL: Final = (480, 336)
+"""Largest width and height in pixels: twice those in which a page shows them."""
+MARGIN: Final = 0.04
+"""Of a panel, in inches."""
+SHOWN_PANEL: Final = {
+    **{"detector": 1, "optics": 5, "psf": 3, "reflections": 1, "shutter": 1, "steps": 3},
+    **{"tool_edges": 1, "camera_files": 1, "correction": 1, "registration": 1},
+    **{"movies": 1, "points": 2},
+}
+"""Index of the axes that stand for an example in the gallery; of others the first."""
 ORDER: Final = (
     *("radiance", "texture", "oxide_direction", "reflections", "steps", "psf", "optics"),
     *("detector", "shutter", "error", "tool_edges"),
@@ -30,8 +43,29 @@ def take(block: tuple[Any, ...], variables: dict[str, Any], settings: dict[str, 
             figure.savefig(path, dpi=DOTS_PER_INCH)
             if known:
                 shown.append(path)
+            else:
+                save_panel(figure, Path(path))
             known.add(id(figure))
     return str(figure_rst(shown, settings["src_dir"]))
+
+
+def save_panel(figure: Figure, path: Path) -> None:
+    """Save one panel of an example's first figure, as its thumbnail, in the folder `PANELS`."""
+    name = path.name.replace("_001.", "_thumb.")
+    axes = figure.axes[SHOWN_PANEL.get(name.removeprefix("sphx_glr_").split("_thumb")[0], 0)]
+    bounds = axes.get_tightbbox()
+    assert bounds is not None, f"{path}: its panel is invisible"
+    inches = Bbox(bounds.transformed(figure.dpi_scale_trans.inverted())).padded(MARGIN)
+    folder = path.parent / PANELS
+    folder.mkdir(exist_ok=True)
+    dots = min(THUMBNAIL[0] / inches.width, THUMBNAIL[1] / inches.height)
+    figure.savefig(folder / name, dpi=dots, bbox_inches=inches)
+
+
+def use_panels(app: Any) -> None:
+    """Show the panels as thumbnails: whole figures cannot be read as small as that."""
+    for panel in Path(app.srcdir, "gallery").glob(f"*/images/{PANELS}/*.png"):
+        shutil.copy(panel, panel.parents[1] / "thumb" / panel.name)
 
 
 class Order:

@@ -1,5 +1,6 @@
 """The documentation: its blocks of code run as a reader types them, and its pages are whole."""
 
+import json
 import os
 import re
 import shutil
@@ -28,7 +29,7 @@ def page_id(page):
 
 
 @pytest.fixture
-def reader(tmp_path, quick_study, own_laws, read_here, undrawn, monkeypatch):
+def reader(tmp_path, quick_study, own_laws, read_here, undrawn, few_draws, monkeypatch):
     """A reader who has run the quick study."""
     cache, folder = tmp_path / "cache", tmp_path / "work"
     cache.mkdir()
@@ -37,6 +38,8 @@ def reader(tmp_path, quick_study, own_laws, read_here, undrawn, monkeypatch):
     for name in known:
         os.link(quick_study.cache / name, cache / name)
     monkeypatch.setenv("CHIPGLOW_CACHE", str(cache))
+    # A correction takes longer than the rest of a small study; that of the quick study is tested.
+    monkeypatch.setattr("chipglow.analysis.engine.corrected_windows", lambda *_: ())
     monkeypatch.setattr(plt, "show", lambda: None)
     matplotlib.use("Agg")
     yield Reader(folder, done=("chipglow reproduce --quick",))
@@ -159,7 +162,13 @@ def build(folder):
     for stub in (ROOT / "docs" / "generated").glob("*.rst"):
         stub.unlink()
     command = [sys.executable, "-c", BUILD, "-q", "-W", str(ROOT / "docs"), str(folder)]
-    run = subprocess.run(command, capture_output=True, encoding="utf-8", cwd=Path(__file__).parent)
+    run = subprocess.run(
+        command,
+        cwd=Path(__file__).parent,
+        env={**os.environ, "NUMBA_NUM_THREADS": "1"},
+        capture_output=True,
+        encoding="utf-8",
+    )
     assert run.returncode == 0, run.stderr
 
 
@@ -237,6 +246,25 @@ def test_the_search_needs_no_server(site):
     index = (site / "searchindex.js").read_text(encoding="utf-8")
     assert index.startswith("Search.setIndex(")
     assert "learn/tutorial" in index
+
+
+ANSWERED = {
+    "true temperature": "do/correct",
+    "batch": "do/many-files",
+    "excel": "do/in-excel",
+    "matlab": "do/in-matlab",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", ANSWERED)
+def test_the_search_lists_first_the_page_that_answers(words, site):
+    """A main entry of the index that equals the query scores 100, a title at most 16, a word 5."""
+    script = (site / "searchindex.js").read_text(encoding="utf-8")
+    index = json.loads(script.removeprefix("Search.setIndex(").removesuffix(")"))
+    ((page, _, is_main),) = index["indexentries"][words]
+    assert is_main
+    assert index["docnames"][page] == ANSWERED[words]
 
 
 @pytest.mark.slow

@@ -29,3 +29,11 @@ def test_the_rooms_are_found_by_name():
     rooms = {"analysis", "camera", "chip", "correction", "cutting", "io", "laboratory", "study"}
     assert rooms < set(dir(chipglow))
     assert {"sweep", "design", "study_budget"} < set(dir(chipglow))
+
+
+def test_the_reference_begins_with_ten_names():
+    reference = next(page for page in PAGES if page.name == "api.md").read_text(encoding="utf-8")
+    begin, _, _ = reference.partition("\n## ")
+    names = re.findall(r"^\| \{py:\w+\}`chipglow\.(\w+) <", begin, re.MULTILINE)
+    assert len(set(names)) == 10
+    assert set(names) <= set(chipglow.__all__)

@@ -236,7 +236,7 @@ def _corrected(
         settings["surroundings"] = described.surroundings()
     if known["--reflected"] is not None or known["--reflected-uncertainty"] is not None:
         settings["surroundings"] = lab.reflected_temperature(
-            known["--reflected"] or 293.0, known["--reflected-uncertainty"] or 0.0
+            known["--reflected"] or lab.LABORATORY, known["--reflected-uncertainty"] or 0.0
         )
     if known["--map"] is not None:
         shapes: tuple[Any, ...] = regions if tool is None else (*regions, tool)

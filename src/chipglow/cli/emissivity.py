@@ -187,7 +187,9 @@ def temperature(
     described = lab.load_places(regions)
     named, surroundings = described.places(), described.surroundings()
     if reflected is not None or reflected_uncertainty is not None:
-        surroundings = lab.reflected_temperature(reflected or 293.0, reflected_uncertainty or 0.0)
+        surroundings = lab.reflected_temperature(
+            reflected or lab.LABORATORY, reflected_uncertainty or 0.0
+        )
     fitted = None if calibration is None else load_calibration(calibration)
     lines = emissivities_of(emissivity, emissivity_uncertainty, described)
     origin = origin_of(emissivity)

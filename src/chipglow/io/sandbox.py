@@ -151,20 +151,14 @@ class Isolated(Source):
     """Another source, read in a subprocess: see `Sandbox`."""
 
     source: Source
-    name: str
-    memory: int = MEMORY
-    patience: float = PATIENCE
+    sandbox: Sandbox
 
     def survey(self) -> Survey:
-        return self._sandbox.answer(self.source.survey)
+        return self.sandbox.answer(self.source.survey)
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
-        with self._sandbox.answers(partial(self.source.frames, raster, start)) as answers:
+        with self.sandbox.answers(partial(self.source.frames, raster, start)) as answers:
             yield from answers
-
-    @property
-    def _sandbox(self) -> Sandbox:
-        return Sandbox(self.name, self.patience, self.memory)
 
 
 class ReaderProcess:

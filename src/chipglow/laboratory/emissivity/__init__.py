@@ -1,6 +1,7 @@
 """Emissivity from images of heated objects, and true temperatures by it."""
 
 from chipglow.laboratory.emissivity.emissivity import (
+    LABORATORY as LABORATORY,
     EmissivityLine as EmissivityLine,
     EmissivityMap as EmissivityMap,
     Heating as Heating,

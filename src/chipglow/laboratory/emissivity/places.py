@@ -38,7 +38,7 @@ PointField = tuple[Coordinate, Coordinate]
 
 @dataclass(frozen=True)
 class CircleSection(Part):
-    """A circle."""
+    """A circle; coordinates may be text with a unit, those of a `Region` are in m."""
 
     centre: Annotated[PointField, Parameter("Its middle.")] = (0.0, 0.0)
     radius: Annotated[Coordinate, Parameter("Its radius.")] = 0.0
