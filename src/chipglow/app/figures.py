@@ -56,6 +56,9 @@ _CORRECTED: Final = "#c2571a"
 _BORDER: Final = 54
 """Pixels on the left of a figure for its labels, the same for all, so that they are aligned."""
 
+_PADDING: Final = 4
+"""Pixels around a figure."""
+
 _LINE_HEIGHT: Final = 150
 """Initial height in pixels of a figure of the temperatures along a line."""
 
@@ -88,10 +91,13 @@ class Image:
         one.toolbar.active_scroll = wheel
         one.grid.visible = False
         one.xaxis.axis_label = "x / µm"
-        one.yaxis.visible = labelled
-        if labelled:
-            one.yaxis.axis_label = "y / µm"
-            one.min_border_left = _BORDER
+        one.yaxis.axis_label = "y / µm"
+        self.label(labelled)
+
+    def label(self, labelled: bool) -> None:
+        """Show or hide the axis on the left: only the first image of a page has one."""
+        self.figure.yaxis.visible = labelled
+        self.figure.min_border_left = _BORDER if labelled else _PADDING
 
     def show(self, panel: Panel) -> None:
         """Show an image; Bokeh has its rows from the bottom."""
@@ -226,8 +232,9 @@ class Figures:
 
     def show(self, picture: Picture) -> None:
         """Show the images of a picture, and no draws."""
-        for name, panel in picture.panels.items():
+        for number, (name, panel) in enumerate(picture.panels.items()):
             self.images[name].show(panel)
+            self.images[name].label(number == 0)
         for name, line in self.lines.items():
             highest = np.nanmax([*picture.lines[name]["measured"], -np.inf])
             line.show(picture.lower_limit, float(highest), picture.crossings.get(name))
@@ -256,7 +263,7 @@ class Figures:
 def _figure(name: str, title: str, height: int, **given: Any) -> Any:
     one = figure(
         name=f"{name}_figure", title=title, frame_width=_SIDE, frame_height=height, tools="",
-        toolbar_location=None, min_border=4, background_fill_color=None, border_fill_color=None,
+        toolbar_location=None, min_border=_PADDING, background_fill_color=None, border_fill_color=None,
         outline_line_color=_GRID, **given,
     )  # fmt: skip
     one.grid.grid_line_color = _GRID
