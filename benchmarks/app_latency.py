@@ -1,12 +1,13 @@
 """How long the app takes from a control to the new picture, in a real browser.
 
-    python benchmarks/app_latency.py [--scene FILE] [--turns N] [--chromium PATH]
+    python benchmarks/app_latency.py [--scene FILE] [--turns N] [--frames N] [--chromium PATH]
 
 Presses keys on the sliders of a page in headless Chromium, as fast as pictures come. Each time is
 from the key's event to the frame of the screen after the new image was there, by the browser's
 clock: the first picture, which may be a quick look, the curves along its lines, and the exact
 picture where the hand rests. Then how long the command took to the first exact picture, and the
-memory of the server.
+memory of the server. With --frames, also how long a PTW file of so many frames of 640 x 512 pixels
+takes from its settings to its image, and a click on the image to the numbers at the cursor.
 """
 
 import os
@@ -15,9 +16,14 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from common import arguments
+
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
+
+from camera_files import ptw
 
 CHROMIUM = os.environ.get("CHIPGLOW_CHROMIUM") or shutil.which("chromium")
 FLAGS = [
@@ -51,8 +57,36 @@ WATCH = """() => {
 }"""
 
 
+CALIBRATION = """\
+model: linear
+band: 3.8-5.1 um
+lowest: 50 degC
+highest: 1500 degC
+parameters: {offset: 500.0, gain: 10.0}
+covariance: [[25.0, 0.0], [0.0, 1.0e-4]]
+"""
+NUMBERS = """() => {
+  window.clicked = [];
+  let asked = 0;
+  addEventListener("pointerup", () => { asked = performance.now(); }, true);
+  const roots = [document];
+  for (const root of roots) {
+    for (const one of root.querySelectorAll("*")) if (one.shadowRoot) roots.push(one.shadowRoot);
+  }
+  const numbers = roots.map((root) => root.querySelector(".numbers")).find(Boolean);
+  new MutationObserver(() => {
+    const since = asked;
+    asked = 0;
+    const shown = () => clicked.push(performance.now() - since);
+    if (since) requestAnimationFrame(() => setTimeout(shown, 0));
+  }).observe(numbers, { childList: true });
+}"""
+
+
 def main():
-    given = arguments(__doc__, scene=Path, turns=40, controls=CONTROLS, chromium=CHROMIUM or str)
+    given = arguments(
+        __doc__, scene=Path, turns=40, controls=CONTROLS, frames=0, chromium=CHROMIUM or str
+    )
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -66,7 +100,44 @@ def main():
                 report(times, times.pop("opened") - begun, server.pid)
             finally:
                 server.terminate()
+        if given.frames:
+            with TemporaryDirectory() as folder:
+                report_recording(browser, Path(folder), given)
         browser.close()
+
+
+def report_recording(browser, folder, given):
+    """Open a recording by its settings, and click on its image."""
+    row, column = np.mgrid[:512, :640]
+    spot = 3000 + 9000 * np.exp(-((column - 320) ** 2 + (row - 256) ** 2) / 2 / 60**2)
+    images = (spot + 4 * number for number in range(given.frames))
+    recording = folder / "run.ptw"
+    recording.write_bytes(ptw(np.stack([image.astype(np.uint16) for image in images])))
+    (folder / "calibration.yaml").write_text(CALIBRATION)
+    command = [sys.executable, "-m", "chipglow", "app", "--no-browser", str(recording)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            page = browser.new_page(viewport={"width": 1400, "height": 900})
+            page.goto(server.stdout.readline().split()[-1])
+            page.get_by_label("pitch", exact=True).fill("15 um")
+            page.get_by_label("calibration", exact=True).fill(str(folder / "calibration.yaml"))
+            page.wait_for_timeout(5000)  # of a user: the app prepares itself meanwhile
+            begun = time.perf_counter()
+            page.get_by_role("button", name="Open").click()
+            page.get_by_text("Measured image").wait_for(timeout=300_000)
+            opened = time.perf_counter() - begun
+            page.evaluate(NUMBERS)
+            box = page.locator("#figure-measured").bounding_box()
+            for number in range(given.turns):
+                page.mouse.click(box["x"] + 120 + 3 * number, box["y"] + 90 + 2 * number)
+                page.wait_for_function(f"() => clicked.length > {number}", polling="raf")
+                page.wait_for_timeout(400)  # a quicker second one would zoom
+            times = page.evaluate("() => clicked")
+        finally:
+            server.terminate()
+    middle, late = np.percentile(times, (50, 95))
+    print(f"recording of {given.frames} frames: {opened:.1f} s; load {os.getloadavg()[0]:.1f}")
+    print(f"numbers at the cursor: median {middle:.0f} ms, 95 % within {late:.0f} ms")
 
 
 def measured(browser, url, given):

@@ -5,6 +5,8 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -92,18 +94,29 @@ def wait_for(done, failed):
 
 @pytest.fixture(scope="session")
 def quick_study(shared_folder):
-    """What ``chipglow reproduce --quick`` writes, as a user runs it."""
+    """What ``chipglow reproduce --quick`` writes, as a user runs it but with blank figures."""
     folder = shared_folder("quick-study", reproduce_quick)
     printed = (folder / "printed.txt").read_text(encoding="utf-8")
     return QuickStudy(folder / "run", folder / "cache", printed)
 
 
+# Drawing its figures takes half of the time of the command; the tests of the report draw them.
+UNDRAWN = """
+from types import SimpleNamespace
+from undrawn import leave_undrawn
+from chipglow.cli import main
+leave_undrawn(SimpleNamespace(setattr=setattr))
+main()
+"""
+
+
 def reproduce_quick(folder):
     """Run the command with its cache, its results and what it prints in a folder."""
-    command = [sys.executable, "-c", "from chipglow.cli import main; main()"]
+    own = {"CHIPGLOW_CACHE": str(folder / "cache"), "COLUMNS": "160", "NUMBA_NUM_THREADS": "1"}
     run = subprocess.run(
-        [*command, "reproduce", "--quick", "--out", str(folder / "run")],
-        env={**os.environ, "CHIPGLOW_CACHE": str(folder / "cache"), "COLUMNS": "160"},
+        [sys.executable, "-c", UNDRAWN, "reproduce", "--quick", "--out", str(folder / "run")],
+        cwd=Path(__file__).parent,
+        env={**os.environ, **own},
         capture_output=True,
         text=True,
         timeout=MOST_SECONDS,
@@ -115,6 +128,14 @@ def reproduce_quick(folder):
 @pytest.fixture
 def undrawn(monkeypatch):
     leave_undrawn(monkeypatch)
+
+
+@pytest.fixture
+def few_draws(monkeypatch):
+    """Budgets of studies from few draws, which differ only where the random inputs count."""
+    budget = import_module("chipglow.uncertainty.budget")  # the package has a function so named
+    for name, number in (("_MEAN_DRAWS", 16), ("_DRAWS", 8), ("_REDRAWS", 2)):
+        monkeypatch.setattr(budget, name, number)
 
 
 @pytest.fixture

@@ -186,7 +186,7 @@ def test_a_straight_ridge_is_found_where_it_is(degrees, width):
     # The tool and the surface cut the ridge off oblique; that reaches as far in as the smoothing.
     distance = band.ridge.distance
     inner = (distance > 40e-6) & (distance < distance[-1] - 40e-6)
-    assert np.abs(across[inner]).max() < 0.4e-6
+    assert np.abs(across[inner]).max() < 0.4e-6  # 0.31 um measured
     assert np.abs(across).max() < width / 2
     assert band.reaches_surface
     assert distance[-1] == pytest.approx((200e-6 - TOOL.edge_point[1]) / sin(angle), abs=width)
@@ -252,7 +252,7 @@ def test_a_ridge_begins_where_the_band_does(degrees, bend, gap, layer):
     assert band.start == pytest.approx(hypot(*(points[0] - TOOL.edge_point)))
     assert depth_in_layer(points).max() < 0
     inner = (along > gap + 40e-6) & (along < along[-1] - 40e-6)
-    assert np.abs(across[inner]).max() < 0.4e-6
+    assert np.abs(across[inner]).max() < 0.4e-6  # the parabola's limit, as above; 0.29 um measured
     # Both ends are cut off oblique: the path bends there by up to 30 degrees.
     assert turning(points) < bend * band.length + radians(60.0)
     whole = np.linspace(0.0, 0.4e-3, 4001)
@@ -294,6 +294,7 @@ def check_that_it_begins_beside_the_layer(rate, workpiece, shape):
     leaves = whole[np.flatnonzero(depth_in_layer(shape.curve(whole)) >= 0)[-1]]
     # The layer's slope hides the ridge's maximum until it is its own standard deviation away.
     assert -2 * GRID.spacing < along[0] - leaves < 8.5e-6 + 2 * GRID.spacing
+    # The layer's slope shifts the ridge: 0.9 um measured.
     assert np.abs(across[along < along[-1] - 40e-6]).max() < 1.5e-6
     assert depth_in_layer(band.ridge.points).max() < 0
     # It is cut off oblique at one end.
@@ -380,6 +381,7 @@ def test_the_segments_of_a_known_thickness_are_found(period, shape):
     found = segmentation(time, 350e-6 + 50e-6 * wave + noise, 20e-6)
     # Noise of 1.5 um where the wave is flat within 3 um of its valley: it is off by some 3 us.
     intervals = found.valleys.size - 1
+    # First and last valley, each off by that, over the intervals between them.
     assert found.period == pytest.approx(period, abs=6e-6 / intervals)
     assert found.period_uncertainty < 6e-6 / np.sqrt(intervals)
     assert found.segments >= int(470e-6 / period) - 1
@@ -387,8 +389,10 @@ def test_the_segments_of_a_known_thickness_are_found(period, shape):
     # sqrt(2 pi) each, off the tip of a saw; of a sine 1 - exp(-(2 pi 1 us / period)^2 / 2).
     slopes = 100e-6 / period * (1 / 0.2 + 1 / 0.8)
     cut = slopes * 1e-6 / np.sqrt(2 * np.pi) if shape == "saw" else 2e-6
+    # The cut, and the noise that smoothing leaves: 3.8 um measured in all.
     assert found.peak == pytest.approx(400e-6, abs=cut + 4e-6)
-    assert found.valley == pytest.approx(300e-6, abs=cut + 4e-6)
+    assert found.valley == pytest.approx(300e-6, abs=cut + 4e-6)  # the same; 3.6 um measured
+    # Peak and valley off by so much each.
     assert found.degree == pytest.approx(0.25, abs=2 * (cut + 4e-6) / 400e-6)
 
 
@@ -472,11 +476,14 @@ def test_the_band_of_the_study_is_the_chips(study, chip):
     band = study.cut.band
     offset = chip.distance_to_band(band.ridge.points, middle)
     inner = (band.ridge.distance > 40e-6) & (band.ridge.distance < 0.85 * band.ridge.distance[-1])
-    assert np.abs(offset[inner]).max() < 1e-6
+    # The ridge lies between samples 2 um apart: 0.26 um measured.
+    assert np.abs(offset[inner]).max() < 0.5e-6
     assert segment.momentary_band is not None
-    assert segment.band_width == pytest.approx(chip.band_width, rel=0.03)
+    # Widths between samples: 0.5 % measured.
+    assert segment.band_width == pytest.approx(chip.band_width, rel=0.01)
     drift = chip.shear_angle_drift * CAMERA.integration_time * band.length / 2
-    assert segment.sweep == pytest.approx(drift, abs=2e-6)
+    # Both ridges are off by tenths of a micrometre: 0.6 um measured.
+    assert segment.sweep == pytest.approx(drift, abs=1e-6)
     period = study.cut.forces.history.segmentation.period
     assert period == pytest.approx(chip.segment_period)
 
@@ -485,6 +492,7 @@ def test_contact_and_errors_of_the_study_make_sense(study, chip):
     lift = 3e-6 / np.tan(radians(12.0))
     rake_place, band_place = study.places
     assert isinstance(rake_place, RakePlace) and isinstance(band_place, BandPlace)
+    # The gap closes between samples, over a wedge of 12 degrees: 5.9 um measured.
     assert rake_place.contact_length == pytest.approx(chip.contact_length + lift, abs=8e-6)
     draws = {name: one_draw(study.data, name) for name in headlines(study.data)}
     for name in ("rake", "band"):
@@ -700,7 +708,8 @@ def test_bands_far_apart_are_heated_on_a_wider_image():
     chip, tool = heated_objects(camera, {"chip 1": CHIP_1}, TOOL, 20e-6, 180e-6, 1)
     assert chip.map.raster.columns == 130
     for row in (*chip.rows, *tool.rows):
-        assert row.found.mean == pytest.approx(row.true.mean, abs=0.05), row.feature
+        # 0.02 measured: few pixels, some mixed at the border.
+        assert row.found.mean == pytest.approx(row.true.mean, abs=0.03), row.feature
 
 
 def test_a_study_that_can_not_be_is_refused(chip):

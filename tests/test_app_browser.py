@@ -13,6 +13,7 @@ from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
+import camera_files
 import numpy as np
 import pytest
 from PIL import Image
@@ -34,6 +35,15 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium, which is not installed"),
 ]
+
+CALIBRATION = """\
+model: linear
+band: 3.8-5.1 um
+lowest: 50 degC
+highest: 1500 degC
+parameters: {offset: 500.0, gain: 10.0}
+covariance: [[25.0, 0.0], [0.0, 1.0e-4]]
+"""
 
 EXACT = re.compile("^Exact picture")
 
@@ -344,6 +354,74 @@ def test_messages_are_visible_and_the_exposure_is_one_that_the_scene_allows(visi
     playwright.expect(slider).to_have_attribute("max", "30", timeout=PATIENCE)
 
 
+def test_a_camera_file_is_dropped_asked_for_and_corrected(visit, tmp_path):
+    y, x = np.mgrid[:40, :60]
+    image = 5000 + 6000 * np.exp(-((x - 30) ** 2 + (y - 20) ** 2) / 2 / 8**2)
+    images = np.stack([image + 40 * number for number in range(4)]).astype(np.uint16)
+    (tmp_path / "run.ptw").write_bytes(camera_files.ptw(images))
+    (tmp_path / "cal.yaml").write_text(CALIBRATION)
+    page = visit()
+    page.set_viewport_size({"width": 1400, "height": 900})
+    page.locator("input[type=file]").set_input_files(tmp_path / "run.ptw")
+    page.get_by_text("pitch: is missing, expected the distance between pixels").wait_for()
+    page.get_by_label("pitch", exact=True).fill("15 kg")
+    page.get_by_label("calibration", exact=True).fill(str(tmp_path / "cal.yaml"))
+    page.get_by_role("button", name="Open").click()
+    page.get_by_text("run.ptw: pitch: '15 kg'").wait_for()
+    page.get_by_label("pitch", exact=True).fill("15 um")
+    page.get_by_role("button", name="Open").click()
+    page.locator("#status", has_text="Set the emissivity and the point spread function").wait_for()
+    figures = [page.locator(f"#figure-{name}") for name in ("measured", "corrected", "half_width")]
+    boxes = [figure.bounding_box() for figure in figures]
+    assert len({box["y"] for box in boxes}) == 1  # side by side
+    assert boxes[2]["x"] + boxes[2]["width"] <= 1400
+    control(page, "camera.psf").select_option("gaussian")
+    turn(page, "PSF width (FWHM)", "20")
+    turn(page, "Emissivity", "0.6")
+    page.locator("#status", has_text=re.compile("^Corrected: ")).wait_for()
+    assert re.search(r"°C ± \d", number(page, "true temperature ± U (95 %)").inner_text())
+    bars = page.get_by_role("table", name="Contributions to its standard uncertainty")
+    assert bars.get_by_role("row").count() == 4  # the three largest, and the others
+    before = number(page, "measured").inner_text()
+    turn(page, "Frame began", "5000")
+    number(page, "measured").filter(has_not_text=before.split(" ±")[0].split()[-1]).wait_for()
+    with page.expect_download() as started:
+        page.get_by_role("button", name="Settings").click()
+    assert started.value.suggested_filename == "run.ptw.yaml"
+    settings = Path(started.value.path()).read_text(encoding="utf-8")
+    assert 'file: "run.ptw"' in settings and "pitch: 15 um" in settings
+    page.set_viewport_size({"width": 400, "height": 900})
+    page.wait_for_function("document.documentElement.scrollWidth <= 400")
+    tops = [figure.bounding_box()["y"] for figure in figures]
+    assert tops == sorted(tops) and len(set(tops)) == 3
+
+
+def test_two_cameras_are_compared_on_one_scale(page):
+    control(page, "images").select_option("cameras")
+    number(page, "second camera").wait_for()
+    control(page, "edited").select_option("second")
+    page.wait_for_url("**edited=second*")
+    turn(page, "Pixel pitch", "12")
+    turn(page, "Emissivity set", "0.6")
+    page.wait_for_url("**set_emissivity=0.6*")
+    shown = page.locator("#status", has_text=EXACT)
+    shown.wait_for()
+    title = "() => Bokeh.documents[0].get_model_by_name('second_figure').title.text"
+    page.wait_for_function(f"({title})() === 'Second camera, emissivity 0.6 / °C'")
+    assert not number(page, "second − first").inner_text().endswith("+0.0 K")
+    assert page.locator("#figure-error").is_hidden()
+    limits = page.evaluate("""() => ["scene", "measured", "second"].map((name) => {
+      const bar = Bokeh.documents[0].get_model_by_name(`${name}_figure`).below
+        .find((one) => one.type === "ColorBar");
+      return [bar.color_mapper.low, bar.color_mapper.high].join();
+    })""")
+    assert len(set(limits)) == 1
+    control(page, "edited").select_option("first")
+    page.wait_for_function(
+        "one => one.value === '6'", arg=control(page, "camera.pitch").element_handle()
+    )
+
+
 def test_a_wrong_file_is_one_clear_error(page, tmp_path):
     file = tmp_path / "holiday.nc"
     file.write_bytes(b"no scene" * 100)
@@ -395,17 +473,23 @@ def test_the_image_is_corrected_while_the_controls_stay_live(page):
     page.locator("#status", has_text=re.compile("^Corrected: ")).wait_for()
     bars = page.get_by_role("table", name="Contributions to its standard uncertainty")
     assert bars.locator(".bar").count() >= 4
-    assert re.search(r"°C ± \d", number(page, "corrected (95 %)").inner_text())
+    assert re.search(r"°C ± \d", number(page, "true temperature ± U (95 %)").inner_text())
     assert control(page, "error_image").is_hidden()
     title = "(name) => Bokeh.documents[0].get_model_by_name(name).title.text"
-    assert page.evaluate(title, "error_figure") == "Half-width (95 %) / K"
-    control(page, "correction_image").select_option("true")
-    page.wait_for_function(f"() => ({title})('error_figure') === 'True temperature / °C'")
+    titles = {
+        name: page.evaluate(title, f"{name}_figure") for name in ("half_width", "true", "error")
+    }
+    assert titles == {
+        "half_width": "Half-width (95 %) / K",
+        "true": "True temperature / °C",
+        "error": "Corrected − true / K",
+    }
+    assert page.locator("#figure-true").is_visible() and page.locator("#figure-scene").is_hidden()
 
 
 def test_all_is_reached_by_the_keyboard_in_either_theme(page):
     reached = set()
-    page.locator("button", has_text="Open…").focus()
+    page.get_by_role("button", name="study.yaml").focus()
     for _ in range(70):
         name = page.evaluate("""() => {
           let one = document.activeElement;

@@ -164,7 +164,7 @@ def test_a_still_uniform_scene_has_an_error_of_emissivity_alone():
 def test_lost_pixels_are_divided_among_the_effects_that_lose_them(scene):
     camera = replace(CAMERA, detector=None, lower_limit=690.0, reflected=None)
     data = attribute(scene, camera, UniformSurface(0.6))
-    assert 0.1 < float(data.lost.mean()) < 0.9
+    assert 0.1 < float(data.lost.mean()) < 0.9  # some pixels are lost, not all
     np.testing.assert_allclose(data.lost_contribution.sum("effect"), data.lost, atol=DOUBLE)
     # The scene itself is above the limit everywhere: the emissivity loses most pixels.
     shares = data.lost_contribution.mean(("y", "x"))
@@ -227,11 +227,14 @@ def test_terms_of_a_saturated_detector_have_the_effects_of_a_literal_computation
             mean[name] += (reading(order[: number + 1]) - reading(order[:number])) / 6
     for name in players:
         # A thousandth of a count, and float32 radiance: 1e-4 K each.
-        np.testing.assert_allclose(data.contribution.sel(effect=name), mean[name], atol=1e-3)
+        np.testing.assert_allclose(data.contribution.sel(effect=name), mean[name], atol=2e-4)
     assert float(data.lost.mean()) > 0.95  # read noise lowers some
+    # A full well at 650 K shows 900 K at least that much too cold.
     assert float(data.contribution.sel(effect="digitiser").max()) < -100.0
-    assert float(np.abs(data.contribution.sel(effect=["shot-noise", "read-noise"])).max()) < 10.0
-    assert float(np.abs(data.contribution.sel(effect=REST)).max()) < 1e-3
+    # Noise of 8e6 electrons: 0.1 K measured.
+    assert float(np.abs(data.contribution.sel(effect=["shot-noise", "read-noise"])).max()) < 0.3
+    # Float32 radiance: 2e-6 K measured.
+    assert float(np.abs(data.contribution.sel(effect=REST)).max()) < 2e-5
 
 
 def test_over_eight_effects_are_sampled_and_close(scene):

@@ -79,9 +79,11 @@ def test_the_reading_is_the_closed_form_and_its_effects_sum_to_the_error():
     positions = PITCH * (np.arange(9) / 9 - 0.5)
     # The hottest pixel is the one nearest to the middle: its centre is within half a pitch.
     expected = shown(positions, 0.6).mean() - 273.15
-    assert frame.shown["peak temperature"] == pytest.approx(expected, abs=0.001 * RISE)
+    # Samples of an eighth of a pixel: 0.003 K measured.
+    assert frame.shown["peak temperature"] == pytest.approx(expected, abs=0.01)
     black = shown(positions).mean() - 273.15
-    assert frame.shown["peak, emissivity set"] == pytest.approx(black, abs=0.001 * RISE)
+    # The same, over an emissivity of 0.6.
+    assert frame.shown["peak, emissivity set"] == pytest.approx(black, abs=0.01)
     total = sum(reading.contributions.values())
     # The scene's temperatures are single floats: 1073 K is known to 6e-5 K.
     assert frame.error["peak temperature"] == pytest.approx(total, abs=1e-4)
@@ -95,7 +97,8 @@ def test_the_reading_is_the_closed_form_and_its_effects_sum_to_the_error():
     low, high = frame.low["peak temperature"], frame.high["peak temperature"]
     # Only the position of the pixels differs: the ends are those of the closed form.
     ends = shown(np.array([PITCH / 2, 0.0]), 0.6) - 273.15
-    assert (low, high) == pytest.approx(tuple(ends), abs=0.001 * RISE)
+    # 40 positions end 1/80 of a pitch before the closed form: 0.09 K.
+    assert (low, high) == pytest.approx(tuple(ends), abs=0.2)
 
 
 def test_a_slow_wide_band_is_shown_as_it_is():

@@ -110,7 +110,7 @@ def test_the_temperature_of_a_found_band_is_returned():
     kept = inner(along) & np.isfinite(profile.temperature[0])
     # Reading between four pixels of a Gaussian of 200 K, 3.3 pixels wide: up to 1/4 of 200/3.3² K.
     error = profile.temperature[0] - image.ridge_temperature(along)
-    assert np.abs(error[kept]).max() < 4.6
+    assert np.abs(error[kept]).max() < 4.6  # that limit; 2.0 K measured
     assert kept.sum() > 80
     # The distance counts from the edge along the curve.
     np.testing.assert_allclose(profile.distance[kept], along[kept], atol=PITCH)
@@ -140,7 +140,8 @@ def test_the_mean_is_over_the_stated_width():
     )
     # The mean of -k n² over a width w is -k w²/12; 80 points come within 1/80² of it.
     drop = narrow.temperature[0] - wide.temperature[0]
-    np.testing.assert_allclose(drop, 1e11 * (40e-6**2 - 1e-6**2) / 12, rtol=0.01)
+    # Values between pixels add to that: 0.3 % measured.
+    np.testing.assert_allclose(drop, 1e11 * (40e-6**2 - 1e-6**2) / 12, rtol=0.005)
 
 
 # Its uncertainty
@@ -232,7 +233,7 @@ def test_a_coarse_image_of_a_wide_band_is_searched_as_well():
     line = find_band(ThermalImage.of(measured([image], raster=raster), 0), TOOL)
     off = np.abs((line.points - TOOL.edge_point).sum(axis=1)) / np.sqrt(2)
     middle = (line.distance > 300e-6) & (line.distance < 1.5e-3)
-    assert off[middle].max() < 0.1 * 30e-6
+    assert off[middle].max() < 0.06 * 30e-6  # a parabola through pixels: 0.03 of a pixel measured
 
 
 # Bad input
@@ -281,7 +282,7 @@ def test_the_netcdf_file_holds_si_units(file, tmp_path):
     assert data["temperature"].attrs["units"] == "K"
     assert data.sizes["time"] == 1
     assert data.attrs["width"] == pytest.approx(12e-6)
-    assert 600 < float(data["temperature"].mean()) < 800
+    assert 600 < float(data["temperature"].mean()) < 800  # the image has nothing else
     read = from_xarray(data, "temperature")
     both = np.hypot(read.contribution("calibration"), read.contribution("position"))
     np.testing.assert_allclose(data["standard_uncertainty"], both)

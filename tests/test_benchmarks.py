@@ -37,6 +37,10 @@ PROGRAMS = {
         "--turns 1 --controls Seed",
         {"Seed": 5, "all": 4, "opened, with the process": 2, "memory": 1},
     ),
+    "region_latency.py": (
+        "--rows 48 --columns 60 --repeats 1",
+        {"point": 5, "box of 40 x 40": 7, "whole image": 5},
+    ),
     "calibration.py": (
         "--repeats 2",
         {"| none |": 5, "| none, sakuma": 5, "| 15 counts": 6, "| 3 points": 6},
@@ -94,6 +98,7 @@ NEEDED = {
     "peers/cuqipy_posterior.py": ("cuqi",),
     "correction_speed.py": ("skimage",),
     "app_latency.py": ("panel", "playwright"),
+    "region_latency.py": ("panel",),
     "fuzz/fuzz.py": ("hypothesis", "lasso", "panel", "pyvista", "tifffile", "zarr"),
     "movies.py": ("av",),
     "rasterise.py": ("pyvista",),

@@ -49,7 +49,7 @@ def test_vibration_is_the_mean_of_displaced_kernels():
     places = amplitude * np.cos(pi * (np.arange(64) + 0.5) / 64)
     lines = [np.diff(erf((edges - p) / (sqrt(2) * SIGMA))) / 2 for p in (0.0, *places)]
     expected = np.outer(lines[0], np.mean(lines[1:], axis=0))
-    assert np.abs(found - expected)[1:-1, 1:-1].sum() < 1e-5
+    assert np.abs(found - expected)[1:-1, 1:-1].sum() < 1e-10  # rounding of 4000 weights
 
 
 def test_blurs_multiply_and_keep_far_light():
@@ -62,10 +62,11 @@ def test_blurs_multiply_and_keep_far_light():
     assert kernel[1:21].sum() == pytest.approx(plain[1:21].sum(), rel=5e-3)
     wide, beyond = (one.view_kernel(4e-6, 100, 100)[:30] for one in (psf, cam.AnnularAperturePSF()))
     # Farther than 32 widths it is left as it is, and nothing is moved to where that ends.
-    np.testing.assert_allclose(wide, beyond, rtol=1e-4)
+    np.testing.assert_allclose(wide, beyond, rtol=1e-9)
     assert kernel.sum() == pytest.approx(1.0, abs=DOUBLE)
     change = psf.view_kernel(4e-6, 100, 100) - cam.AnnularAperturePSF().view_kernel(4e-6, 100, 100)
     place = 4e-6 * np.arange(-100, 101)
+    # Of all light: 1.8e-3 measured.
     assert np.abs(change[np.hypot(place, place[:, None]) > 150e-6]).sum() < 2e-3
     assert kernel.max() < 0.9 * plain.max()
     frequency = 0.5 / 8e-6
@@ -73,7 +74,8 @@ def test_blurs_multiply_and_keep_far_light():
     change = (kernel.sum(0) - plain.sum(0)) @ np.cos(2 * pi * frequency * place)
     own = annular_transfer(np.array(frequency * 4.5e-6 / 0.56), 0.35) * np.sinc(2e-6 * frequency)
     blurs = np.exp(-2 * (pi * 1.5e-6 * frequency) ** 2) * np.sinc(4e-6 * frequency)
-    assert change == pytest.approx(float(own) * (blurs - 1), abs=2e-5)
+    # Samples of 2 um: 1.6e-6 measured.
+    assert change == pytest.approx(float(own) * (blurs - 1), abs=5e-6)
 
 
 def edge_scene():

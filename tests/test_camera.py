@@ -250,7 +250,7 @@ def test_sensors_of_a_plane_read_it_at_their_middles(pitch, offset, fill):
     # A sample is even inside, so that a pixel's mean is that of a plane up to half a sample away
     # in x and in y: (1 + 3) / 2 samples.
     found = integrate(plane, scene, sensors, fill)
-    np.testing.assert_allclose(found, expected, atol=2 * SPACING)
+    np.testing.assert_allclose(found, expected, atol=2 * SPACING)  # those two samples
 
 
 def test_a_ninth_of_a_sensor_is_its_middle_third():
@@ -352,6 +352,7 @@ def test_light_from_beyond_the_scene():
         at_border = ((1 - erf(x / (sqrt(2) * sigma))) / 2) @ weights / 2
         if order == "detector":
             at_border = (1 - erf(3e-6 / (sqrt(2) * sigma))) / 2
+        # Samples of the scene beside the border: 0.13 % measured.
         assert beyond[5, 0] == pytest.approx(at_border, rel=2e-3)
         assert beyond[5, 10] < 1e-12
         part = replace(camera, shape=(2, 2), offset=(12e-6, 0.0)).light_from_beyond(scene)

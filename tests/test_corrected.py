@@ -44,10 +44,11 @@ def test_the_interval_is_that_of_the_model_itself(error):
     )
     # The interval is stable to half a unit of the second digit of u, here 0.5 K.
     ends = found.distribution.low, found.distribution.high
-    assert ends == pytest.approx((low, high), abs=2.0)
+    assert ends == pytest.approx((low, high), abs=1.0)  # twice that
     assert high - found.estimate.values > 1.3 * (found.estimate.values - low)
+    # The inverse of Planck's law: 2e-10 K.
     assert float(found.estimate.values) == pytest.approx(
-        float(BAND.temperature((seen - 0.58 * room) / 0.42)), abs=1e-6
+        float(BAND.temperature((seen - 0.58 * room) / 0.42)), abs=1e-9
     )
     assert any("Monte Carlo does not confirm" in text for text in found.warnings)
 
@@ -145,17 +146,17 @@ surface: {kind: uniform, emissivity: 0.6}
 camera: {psf: {kind: gaussian, fwhm: 12 um}, psf_order: optics, lower_limit: none}
 analysis:
   regions:
-    plate: {polygon: [[-45 um, -45 um], [45 um, -45 um], [45 um, 45 um], [-45 um, 45 um]]}
+    plate: {polygon: [[-21 um, -21 um], [21 um, -21 um], [21 um, 21 um], [-21 um, 21 um]]}
 uncertainty: {inputs: {camera.psf.fwhm: {standard: 5 %}}}
 """
 
 
 @pytest.mark.parametrize(("noise", "most"), [(0.0, 0.1), (1.0, None)])
-def test_region_and_pixels_agree_where_both_apply(tmp_path, monkeypatch, noise, most):
-    """A plate of 168 um on a colder ground, of which a region in the middle is known."""
+def test_region_and_pixels_agree_where_both_apply(tmp_path, few_draws, monkeypatch, noise, most):
+    """A plate of 120 um on a colder ground, of which a region in the middle is known."""
     monkeypatch.chdir(tmp_path)
-    raster = Raster(left=-120e-6, top=120e-6, spacing=1e-6, rows=240, columns=240)
-    inside = np.maximum(*np.abs(np.meshgrid(raster.x, raster.y))) < 84e-6
+    raster = Raster(left=-84e-6, top=84e-6, spacing=1e-6, rows=168, columns=168)
+    inside = np.maximum(*np.abs(np.meshgrid(raster.x, raster.y))) < 60e-6
     kelvins = np.where(inside, PLATE, COLD)[None]
     write_scene(Scene.from_fields(raster, [0.0], {"temperature": kelvins}), "plate.nc")
     (tmp_path / "study.yaml").write_text(PLATE_STUDY, encoding="utf-8")
@@ -165,23 +166,24 @@ def test_region_and_pixels_agree_where_both_apply(tmp_path, monkeypatch, noise, 
     spread = noise * float(camera.band.slope(600.0))
     light = seen.radiance + np.random.default_rng(8).normal(0.0, spread, seen.radiance.shape)
     image = Measurement.from_radiance(light, camera.band, seen.times, seen.raster)
-    corners = ((-45e-6, -45e-6), (45e-6, -45e-6), (45e-6, 45e-6), (-45e-6, 45e-6))
+    corners = ((-21e-6, -21e-6), (21e-6, -21e-6), (21e-6, 21e-6), (-21e-6, 21e-6))
     region = Region("plate", Polygon(corners), unit="m")
     line = em.EmissivityLine.constant(0.6, 0.012)
     dark = em.reflected_temperature(COLDEST)
     rows = em.true_temperatures([image], [region], line, dark)
     by_region = corrected_temperatures(rows, image, study)[0]["plate"].estimate
-    pixels = correct_study(study, image, emissivity_uncertainty=0.012, noise=max(noise, 0.05))
+    pixels = correct_study(study, image, emissivity_uncertainty=0.012, noise=max(noise, 0.2))
     by_pixels = pixels.at(region)
     one, other = float(by_region.values), float(by_pixels.values)
     if most is not None:
         # Beyond the region the plate is three widths of the blur wide; the rest is solving.
         assert abs(one - other) < most and abs(one - PLATE) < most
-    # The emissivity is common to both; of the noise, each takes the mean over 225 pixels.
+    # The emissivity is common to both; of the noise, each takes the mean over 49 pixels.
     own = [by_region.without("emissivity"), by_pixels.without("emissivity")]
     combined = np.hypot(*(float(part.standard_uncertainty) for part in own))
     assert abs(one - other) < 2 * combined + 0.1
     both = [float(found.standard_uncertainty) for found in (by_region, by_pixels)]
     # An emissivity of 2 % is the same change of the radiance for both.
     stated = 0.02 * float(camera.band.radiance(PLATE)) / float(camera.band.slope(PLATE))
-    assert both == pytest.approx([stated, stated], rel=0.03)
+    # To first order in 2 %: 0.04 % measured.
+    assert both == pytest.approx([stated, stated], rel=0.002)

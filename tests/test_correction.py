@@ -361,7 +361,7 @@ def test_places_of_a_result(chip_and_tool, tmp_path):
     row = 24 - 12
     assert float(point.values) == result.data["temperature"][0].values[row, 8]
     stated = result.data["standard_uncertainty"][0].values[row, 8]
-    assert float(point.standard_uncertainty) == pytest.approx(stated, rel=1e-5)
+    assert float(point.standard_uncertainty) == pytest.approx(stated, rel=1e-7)  # stored as float32
     budget = result.budget((8 * PITCH, 12 * PITCH))
     assert list(budget["standard_uncertainty"]) == sorted(
         budget["standard_uncertainty"], reverse=True

@@ -75,7 +75,8 @@ def test_no_gap_between_chip_and_tool_and_the_tool_shows_its_own_temperature():
     beside = (DEPTH > 0) & (Y > -50e-6) & (Y < 120e-6) & (X > -110e-6)
     assert (frame.material[beside] == Material.WORKPIECE).all()
     deep = DEPTH < -15e-6
-    assert frame.temperature[deep] == pytest.approx(400.0 + 1e6 * X[deep], abs=1e-3)
+    # Float32 of 500 K, several times: 6e-5 K measured.
+    assert frame.temperature[deep] == pytest.approx(400.0 + 1e6 * X[deep], abs=2e-4)
 
 
 def test_steps_do_not_overshoot():
@@ -84,7 +85,7 @@ def test_steps_do_not_overshoot():
     frame = frame_of(points, temperature=field, plastic_strain=1e-3 * field)
     chip = frame.material == Material.WORKPIECE
     assert frame.temperature[chip].min() >= 300.0
-    assert frame.temperature[chip].max() <= 1300.0
+    assert frame.temperature[chip].max() <= 1300.0  # the larger of both values
 
 
 @pytest.mark.parametrize("degrees", [-20.0, -7.0, 0.0, 6.0, 15.0])

@@ -134,7 +134,7 @@ def test_adiabatic_shear_follows_the_flow_stress():
     stress_now = np.sqrt(3 * (xx**2 + xx * yy + yy**2 + xy**2)).mean()
     shear_modulus = AISI_1045.shear_modulus_at(here["temperature"].mean())
     end = 1.0 / sqrt(3) - stress_now / (3 * shear_modulus)
-    assert here["strain"].mean() == pytest.approx(end, rel=1e-3)
+    assert here["strain"].mean() == pytest.approx(end, rel=1e-4)  # explicit steps: 3e-5 measured
     # Far below the differences that are allowed.
     solution = solve_ivp(change, (0.0, end), [293.0, 0.0], rtol=1e-8, max_step=0.01)
     temperature, damage = solution.y[:, -1]
@@ -144,7 +144,8 @@ def test_adiabatic_shear_follows_the_flow_stress():
     # The step in which the damage reaches 1 counts whole: 2.9e-4 over a strain to failure of 0.09.
     assert here["damage"].mean() == pytest.approx(damage, abs=2e-3 * damage + 2.9e-4 / 0.09)
     flowing = weakening(damage, harm) * flow_stress(end, equivalent_rate, temperature, law)
-    assert stress_now == pytest.approx(flowing, rel=2e-3)
+    # By the heat and the damage above: 9e-5 measured.
+    assert stress_now == pytest.approx(flowing, rel=5e-4)
 
 
 def pressed_on_a_face(**friction):
@@ -230,6 +231,7 @@ def test_energy_account_of_a_short_cut_closes():
     energy = history.energy
     # The force through the tool and the work of the drive are counted apart; inertia is 1 %.
     work = np.cumsum(history.cutting) * 1e-6 * CuttingConditions().speed
+    # That 1 %, and the force's means: 2 % measured.
     assert energy.drive_work[-1] == pytest.approx(work[-1], rel=0.03)
     # What is left over is the dissipation of the transfer, which only takes.
     assert 0 < energy.closing_error[-1] < 0.015

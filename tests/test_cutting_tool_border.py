@@ -99,7 +99,7 @@ def test_a_small_tool_heats_up_like_a_large_one():
     # The large one is wide enough: 2.4 mm against √(αt) = 0.2 mm. Measured 0.01 K, and 0.5 K
     # insulated, at the face; at the border 2.3 K, and 74 K insulated.
     assert np.abs(small - large)[1].max() < 0.03
-    assert np.abs(small - large).max() < 3.0
+    assert np.abs(small - large).max() < 3.0  # that 2.3 K
     assert np.abs(insulated - large).max() > 50.0
 
 
@@ -118,7 +118,7 @@ def test_no_heat_is_lost_at_the_border():
     tool.heat(5e-3, once)
     first = HEAT.capacity * tool.grid.cell**2
     before = first * 100.0 * np.maximum(tool.fraction, SMALLEST_FRACTION)[tool.fraction > 0].sum()
-    assert tool.temperature.max() < 50.0
+    assert tool.temperature.max() < 50.0  # half of what was set: heat was taken; 35 measured
     assert tool.held() == pytest.approx(before, rel=DOUBLE)
 
 

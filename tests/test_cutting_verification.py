@@ -50,7 +50,8 @@ def test_struck_plate_is_as_short_and_wide_as_by_finite_elements():
     shape = taylor.shape_of_points(taylor.strike(0.4e-3))
     # benchmarks/peers/elements.py with 10 x 100 elements; the difference falls with the cell.
     assert taylor.LENGTH - shape.length == pytest.approx(2.335e-3, rel=0.03)
-    assert shape.foot == pytest.approx(5.284e-3, rel=0.06)
+    # As above: it falls with the cell; 2.8 % measured.
+    assert shape.foot == pytest.approx(5.284e-3, rel=0.04)
 
 
 def test_command_prints_the_checks_draws_and_says_what_fails(tmp_path, capsys, monkeypatch):

@@ -95,7 +95,8 @@ def test_halving_finds_the_best_of_64_settings_with_a_tenth_of_the_draws(heating
     assert best <= 1.05 * min(total.values())
     # The study's own settings, of 10 us, are among the 64.
     own = expected(10e-6)
-    assert found.regret[0] == pytest.approx(np.dot([1, 2], own) - best, abs=0.02)
+    # The table of the radiance: 0.001 K measured.
+    assert found.regret[0] == pytest.approx(np.dot([1, 2], own) - best, abs=0.005)
 
 
 def test_settings_beyond_a_limit_are_excluded(heating):

@@ -74,9 +74,11 @@ def test_slopes_of_the_bulge_are_those_of_its_arc():
     # On a circle the depth from where it is flat is R sin of the slope.
     slope = np.arccos(elements.cosines[chip])
     flat = Wedge(angle=radians(30.0))
-    assert degrees(slope[0]) == pytest.approx(60.0, abs=3.0)
+    # The first element is 0.05 degrees from its foot.
+    assert degrees(slope[0]) == pytest.approx(60.0, abs=0.2)
+    # Each element is straight: 2.4e-4 measured.
     np.testing.assert_allclose(
-        np.sin(slope), np.cos(flat.angle) - elements.depths[chip] / flat.bulge_radius, atol=2e-3
+        np.sin(slope), np.cos(flat.angle) - elements.depths[chip] / flat.bulge_radius, atol=5e-4
     )
 
 

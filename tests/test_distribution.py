@@ -109,8 +109,8 @@ def test_three_draws_of_what_decides_count_as_three():
 def test_a_part_of_an_error_of_unknown_sign_is_not_told():
     names, portion = ("rake face", "mid-contact", "chip 2"), Distribution(np.full(3, -10.0), "a")
     error, known = (Distribution(np.array([-30.0, one, -20.0]), "a") for one in (1.0, -10.0))
-    assert Headline(*names, error, error, portion, error, error).psf_fraction is None
-    fraction = Headline(*names, known, known, portion, known, known).psf_fraction.mean
+    assert Headline(error, portion, error, error, *names, error).psf_fraction is None
+    fraction = Headline(known, portion, known, known, *names, known).psf_fraction.mean
     assert fraction == pytest.approx((1 / 3 + 1 + 1 / 2) / 3)
 
 

@@ -29,7 +29,7 @@ def page_id(page):
 
 
 @pytest.fixture
-def reader(tmp_path, quick_study, own_laws, read_here, undrawn, monkeypatch):
+def reader(tmp_path, quick_study, own_laws, read_here, undrawn, few_draws, monkeypatch):
     """A reader who has run the quick study."""
     cache, folder = tmp_path / "cache", tmp_path / "work"
     cache.mkdir()
@@ -38,6 +38,8 @@ def reader(tmp_path, quick_study, own_laws, read_here, undrawn, monkeypatch):
     for name in known:
         os.link(quick_study.cache / name, cache / name)
     monkeypatch.setenv("CHIPGLOW_CACHE", str(cache))
+    # A correction takes longer than the rest of a small study; that of the quick study is tested.
+    monkeypatch.setattr("chipglow.analysis.engine.corrected_windows", lambda *_: ())
     monkeypatch.setattr(plt, "show", lambda: None)
     matplotlib.use("Agg")
     yield Reader(folder, done=("chipglow reproduce --quick",))
@@ -160,7 +162,13 @@ def build(folder):
     for stub in (ROOT / "docs" / "generated").glob("*.rst"):
         stub.unlink()
     command = [sys.executable, "-c", BUILD, "-q", "-W", str(ROOT / "docs"), str(folder)]
-    run = subprocess.run(command, capture_output=True, encoding="utf-8", cwd=Path(__file__).parent)
+    run = subprocess.run(
+        command,
+        cwd=Path(__file__).parent,
+        env={**os.environ, "NUMBA_NUM_THREADS": "1"},
+        capture_output=True,
+        encoding="utf-8",
+    )
     assert run.returncode == 0, run.stderr
 
 

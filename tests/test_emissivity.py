@@ -359,7 +359,8 @@ def test_the_command_writes_table_map_and_picture(folder):
         # Nine digits.
         assert lines["expanded_uncertainty"][name] == pytest.approx(expanded, rel=1e-8)
     chip = study_of(said).surface.chips["measured chip"]
-    assert chip.body.mean == pytest.approx(lines["mean"]["chip body"], abs=6e-5)
+    # The written study has six digits: 2e-6 measured.
+    assert chip.body.mean == pytest.approx(lines["mean"]["chip body"], abs=5e-6)
     surface, found = em.read_emissivity_map("one.nc"), em.determine_emissivity([image], heating)
     known = (pytest.approx(BAND.lower), pytest.approx(BAND.upper)), "Ti-6Al-4V"
     for one in (surface, *surfaces_of(study_of(said).surface, 1).values()):
@@ -456,7 +457,7 @@ def test_a_measured_chip_is_its_features_by_their_lines(strain, rate, parts):
         part * (lines[name].at(850.0) - lines[name].at(664.15)).values
         for name, part in parts.items()
     )
-    np.testing.assert_allclose(hot - cold, expected, atol=2 * STEP)
+    np.testing.assert_allclose(hot - cold, expected, atol=2 * STEP)  # a step of the map each
     # Of 960 pixels it is known to 0.0016: five times that.
     assert lines["chip body"].standard_deviation == pytest.approx(0.07, abs=0.008)
 
@@ -466,6 +467,7 @@ def test_a_map_of_several_temperatures_has_a_line_in_each_pixel():
     surface = em.read_emissivity_map("two.nc")
     with xr.open_dataset("two.nc", engine="h5netcdf") as data:
         for kelvins, one in zip((TRUTH, 500.0 + CELSIUS), data["emissivity"].values, strict=True):
+            # Likewise.
             np.testing.assert_allclose(shown(surface, kelvins), np.clip(one, 0, 1), atol=2 * STEP)
     # The body's emissivity is 0.04 more; its mean over 960 pixels varies by 0.07 / 31.
     assert shown(surface, 500.0 + CELSIUS)[:, :16].mean() == pytest.approx(0.46, abs=0.01)

@@ -51,7 +51,7 @@ def test_points_are_a_frame_with_how_far_off_they_are():
     assert frame["point"].tolist() == [1, 2, 3, 4]
     np.testing.assert_allclose(frame["x_um"], [0.0, 1000.0, 0.0, 1000.0])
     # Least squares of a plane spread an error at one corner over all four.
-    np.testing.assert_allclose(frame["residual"], 0.1, rtol=1e-6)
+    np.testing.assert_allclose(frame["residual"], 0.1, rtol=1e-12)
     size, turn, mirrored = fit.registration.geometry(RASTER)
     assert (round(size * 1e6), mirrored) == (10, True)
-    assert abs(turn) < 1
+    assert abs(turn) < 0.5  # degrees: an error of one corner turns the map by 0.1

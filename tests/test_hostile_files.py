@@ -327,7 +327,7 @@ def test_ctrl_c_in_a_callback_of_a_library_counts(monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         del thing
         time.sleep(60)  # the second Ctrl-C comes after 0.01 s, and ends this
-    assert time.monotonic() - begin < 30
+    assert time.monotonic() - begin < 30  # s: half of the sleep, on a busy machine
     assert watch() is None
 
 

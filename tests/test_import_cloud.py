@@ -76,7 +76,8 @@ def test_the_surface_is_within_half_a_spacing(jitter, angle):
     assert inside[material == 0].max() < 0.5  # no hole, and no more lost at the corners
     assert inside[material == 1].min() > -0.5
     area = material.sum() * raster.spacing**2
-    assert area == pytest.approx(COLUMNS * ROWS * A**2, rel=0.02)
+    # Samples on the border: 0.4 % measured.
+    assert area == pytest.approx(COLUMNS * ROWS * A**2, rel=0.01)
 
 
 def test_values_do_not_cross_a_gap():
@@ -146,7 +147,8 @@ def test_points_at_random_fill_their_area(seed):
     generator = np.random.default_rng(seed)
     places = generator.uniform(0.0, 1.0, (2000, 2)) * [60e-6, 40e-6]
     spacing = neighbour_distance(places)
-    assert spacing == pytest.approx(np.sqrt(60e-6 * 40e-6 / 2000), rel=0.06)
+    # The median of random distances, near the border too: 2 % measured.
+    assert spacing == pytest.approx(np.sqrt(60e-6 * 40e-6 / 2000), rel=0.05)
     raster = Raster(0.0, 40e-6, 0.5e-6, 80, 120)
     found, material = sample_cloud(a_cloud(places, spacing=spacing), raster)
     # Some gaps between points at random are wider than the spacing; without the wider weights a
@@ -242,9 +244,10 @@ def test_every_format_gives_back_what_was_written(tmp_path, write):
     survey = source.survey()
     # In s: times of 1e-6 s are rounded to 1e-22 s.
     np.testing.assert_allclose(survey.times, TIMES, atol=1e-15)
-    np.testing.assert_allclose(survey.extent, (0, COLUMNS * A, 0, ROWS * A), atol=1e-3 * A)
+    # Rounding, in m.
+    np.testing.assert_allclose(survey.extent, (0, COLUMNS * A, 0, ROWS * A), atol=1e-15)
     assert survey.found["temperature"] == "temperature"
-    assert survey.spacing == pytest.approx(A, rel=1e-4)
+    assert survey.spacing == pytest.approx(A, rel=1e-12)  # rounding
     assert any("neighbours in the first frame" in text for text in survey.notes.assumed)
     expected = linear(*np.meshgrid(RASTER.x, RASTER.y))
     frames = list(source.frames(RASTER))
@@ -255,6 +258,7 @@ def test_every_format_gives_back_what_was_written(tmp_path, write):
         seen &= (expected > limits.min()) & (expected < limits.max())
         # Places of VTK are in 32 bits: 1e-7 of 60 um, times the gradient.
         found = frame.fields["temperature"][seen] - 1e7 * frame.time
+        # Float32, of a sum and a difference.
         np.testing.assert_allclose(found, expected[seen], atol=2 * ROUNDING)
     (last,) = source.frames(RASTER, start=2)
     np.testing.assert_array_equal(last.fields["temperature"], frames[2].fields["temperature"])
@@ -320,9 +324,10 @@ def test_slab_of_points_in_three_dimensions(tmp_path, thickness, with_volume):
     (frame,) = source.frames(RASTER)
     (flat,) = CloudSource(str(npy_structured(tmp_path)[0])).frames(RASTER, start=2)
     different = frame.material != flat.material
-    assert different.mean() < 0.02
+    assert different.mean() < 1e-3  # none measured; one on the border may be rounded
     expected = linear(*np.meshgrid(RASTER.x, RASTER.y))
     inner = (slice(25, 75), slice(25, 115))
+    # Float32 of values and places.
     np.testing.assert_allclose(
         frame.fields["temperature"][inner], expected[inner], atol=2 * ROUNDING
     )
@@ -338,6 +343,7 @@ def test_parts_of_the_tool(tmp_path):
     write_csv(tmp_path / "p.csv", table)
     (frame,) = CloudSource(str(tmp_path / "p.csv"), tool_parts=(7, 8)).frames(RASTER)
     assert set(np.unique(frame.material)) == {0, 1, 2}
+    # A sample; half of one measured.
     assert RASTER.x[(frame.material == 2).any(axis=0)].min() == pytest.approx(30e-6, abs=0.5e-6)
 
 

@@ -90,6 +90,7 @@ def test_lab_of_published_colours():
         (0.0, 0.0, 0.0): (0.0, 0.0, 0.0),
     }
     for colour, value in expected.items():
+        # Published to 0.01, with a rounded matrix: 0.005 measured.
         assert lab(colour) == pytest.approx(value, abs=0.02)
 
 
@@ -165,6 +166,7 @@ def test_values_by_the_legend(tmp_path, codec, outline):
     shown[:, 186:] = False
     error = frame.fields["temperature"][shown] - truth[shown]
     assert (frame.material[:, 192:] == Material.VOID).all()
+    # Samples of 16,000 at the border: up to 130 measured.
     assert np.isfinite(truth[:, :186]).sum() - shown.sum() < 200
     # A codec blurs the ends of the bar by a pixel, which is 8 K.
     pixel = (ENDS[1] - ENDS[0]) / 140
@@ -298,7 +300,8 @@ def test_movies_are_read_in_step(tmp_path):
     frame = list(source.frames(own_raster(source), start=1))[1]
     truth = known_field(2, SHAPE)
     strain = 5 * (truth - ENDS[0]) / (ENDS[1] - ENDS[0])
-    assert np.nanmax(np.abs(frame.fields["plastic_strain"] - strain)) < 0.1
+    # A level of 256 is 0.02; 0.03 measured.
+    assert np.nanmax(np.abs(frame.fields["plastic_strain"] - strain)) < 0.06
     short = a_movie(tmp_path / "c.avi", count=2)
     with pytest.raises(SourceError, match=r"c\.avi: 2 pictures of 120 x 90, expected 3 of"):
         a_source(one, plastic_strain_rate=a_field(short, (0.0, 1e5), RAINBOW)).survey()
@@ -317,7 +320,7 @@ def test_a_movie_that_ffmpeg_drew():
     for number, frame in enumerate(frames):
         truth = example.truth(number)
         workpiece = frame.material == Material.WORKPIECE
-        assert (workpiece != np.isfinite(truth)).mean() < 0.01
+        assert (workpiece != np.isfinite(truth)).mean() < 0.01  # samples on the border
         read = workpiece & np.isfinite(truth) & (frame.quality != FILLED)
         error = frame.fields["temperature"][read] - truth[read]
         assert np.sqrt((error**2).mean()) < 2 * source.uncertainty()["temperature"].total
@@ -385,7 +388,7 @@ def test_a_grey_tool_has_no_values(tmp_path, how):
     np.testing.assert_array_equal(frame.material == Material.TOOL, tool)
     assert np.isnan(frame.fields["temperature"][tool]).all()
     beside = frame.fields["temperature"][40:, 85:89] - known_field(0, SHAPE)[40:, 85:89]
-    assert np.abs(beside).max() < 15
+    assert np.abs(beside).max() < 5  # K, without the tool's colour: 2 K measured
 
 
 @settings(max_examples=30)
@@ -517,6 +520,7 @@ def test_bands_are_counted_though_a_codec_blurs_them(tmp_path, name, bands):
 
 def test_lines_of_a_mesh_are_found_and_a_narrow_band_is_none(tmp_path):
     meshed = one_picture(tmp_path, "gray", edges=True, codec=GIF)
+    # Lines every 8 or 9 samples: 0.12 measured.
     assert 0.1 < dark_lines(meshed)[100:, :250].mean() < 0.3
     hot = drawn(known_field(0, SHAPE), NamedMap("jet"))
     hot[:, 40:42] = (0, 0, 0)
@@ -625,7 +629,7 @@ def test_bands_that_are_stated_are_not_counted(tmp_path):
     source, found = read_with_box(tmp_path / "a.mp4", picture, BAR, H264_420, bands=24)
     assert "Legend of 24 bands" in " ".join(source.survey().notes.assumed)
     middles = ENDS[0] + (ENDS[1] - ENDS[0]) * (np.arange(24) + 0.5) / 24
-    assert np.abs(np.unique(found)[:, None] - middles).min(axis=1).max() < 0.01
+    assert np.abs(np.unique(found)[:, None] - middles).min(axis=1).max() < 1e-9  # rounding
 
 
 def test_a_lying_legend_is_read_from_its_left_end(tmp_path):
@@ -635,6 +639,7 @@ def test_a_lying_legend_is_read_from_its_left_end(tmp_path):
     movie = FieldMovie(str(tmp_path / "a.mkv"), *ENDS, legend=(20, 20, 220, 40))
     source = MovieSource(movie, pixel=PIXEL, crop=(20, 70, 220, 310), origin=(20.0, 310.0))
     found = first_frame(source).fields["temperature"]
+    # Two levels of 8 bits; 1.2 measured.
     np.testing.assert_allclose(found, truth[:, ::-1].T[:, ::-1], atol=2 * LEVEL)
 
 
@@ -676,4 +681,4 @@ def test_what_lies_under_lines_is_in_the_uncertainty(tmp_path):
     assert "by the lines drawn over them" in source.survey().notes.assumed[-1]
     frame = first_frame(source)
     error = (frame.fields["temperature"] - known_field(0, SHAPE))[frame.material == 1]
-    assert 0.5 < np.sqrt(np.nanmean(error**2)) / found.total < 2
+    assert 0.5 < np.sqrt(np.nanmean(error**2)) / found.total < 2  # 0.73 measured

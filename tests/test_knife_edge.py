@@ -147,7 +147,8 @@ def test_a_tail_is_told_from_a_wider_core():
 def test_edge_line_and_mtf_of_the_bins_are_those_that_made_the_edge(clean):
     edge = clean.edges[0]
     curves = {name: curve.values for name, curve in edge.curves.items()}
-    assert np.median(np.diff(curves["distance"])) == pytest.approx(PITCH / 4, rel=0.02)
+    # Bins hold pixels at any distance: 0.5 % measured.
+    assert np.median(np.diff(curves["distance"])) == pytest.approx(PITCH / 4, rel=0.01)
     assert curves["pixels"].sum() == 40 * 40
     assert np.mean(np.abs(curves["esf_residual"]) < 2 * curves["esf_uncertainty"]) > 0.9
     frequency = curves["frequency"]
@@ -159,7 +160,7 @@ def test_edge_line_and_mtf_of_the_bins_are_those_that_made_the_edge(clean):
     # Of a Gaussian and a square, nearly a Gaussian; the square alone would have 6 um.
     assert edge.line_fwhm == pytest.approx(sigma * FWHM_PER_SIGMA, rel=0.02)
     light = np.sum(curves["lsf"] * np.diff(curves["distance"]))
-    assert light == pytest.approx(1.0, abs=0.02)
+    assert light == pytest.approx(1.0, abs=0.02)  # the noise of both ends: 0.6 % measured
 
 
 def test_a_round_spread_is_found_from_edges_of_several_orientations(clean):
@@ -168,6 +169,7 @@ def test_a_round_spread_is_found_from_edges_of_several_orientations(clean):
     assert abs(found.fwhm - FWHM) < 3 * found.edge_uncertainty
     # Three images: 1/√3 of the uncertainty of one.
     ratio = found.edge_uncertainty / clean.edge_uncertainty
+    # Uncertainties follow from the residuals of each: 22 % measured.
     assert ratio == pytest.approx(1 / sqrt(3), rel=0.25)
 
 
@@ -185,8 +187,10 @@ def test_an_elliptical_spread_is_told_from_a_round_one():
     assert found.best.model.name == "elliptical gaussian"
     x, y, both = found.best.values
     squares, axes = np.linalg.eigh([[x**2, both * x * y], [both * x * y, y**2]])
-    assert np.sqrt(squares) == pytest.approx((least, largest), rel=0.03)
-    assert degrees(np.arctan(axes[1, 1] / axes[0, 1])) == pytest.approx(30.0, abs=1.5)
+    # By the noise: 0.3 % measured.
+    assert np.sqrt(squares) == pytest.approx((least, largest), rel=0.01)
+    # In degrees, by the noise: 0.4 measured.
+    assert degrees(np.arctan(axes[1, 1] / axes[0, 1])) == pytest.approx(30.0, abs=1.0)
     for edge, normal in zip(found.edges, normals, strict=True):
         assert abs(edge.fwhm - width(normal)) < 3 * edge.fwhm_uncertainty
     kernel = found.psf().kernel(1e-6)
@@ -194,10 +198,11 @@ def test_an_elliptical_spread_is_told_from_a_round_one():
     # First row on top: y goes up as the row number goes down.
     across = np.sum(kernel * x * -x[:, None]) * 1e-12
     expected = (largest**2 - least**2) / 2 * np.sin(2 * direction) / FWHM_PER_SIGMA**2
-    assert across == pytest.approx(expected, rel=0.1)
+    assert across == pytest.approx(expected, rel=0.02)  # the same, and samples of 1 um: 0.5 %
     flat = knife_edge([an_image(4.0, gaussian_edge(12e-6)), an_image(94.0, gaussian_edge(9e-6))])
     assert flat.best.model.name == "elliptical gaussian"
-    assert flat.best.values == pytest.approx([12e-6, 9e-6], rel=0.03)
+    # By the noise: 0.2 % measured.
+    assert flat.best.values == pytest.approx([12e-6, 9e-6], rel=0.01)
 
 
 def test_where_no_model_fits_all_count_alike():
@@ -245,7 +250,7 @@ def test_an_oval_that_the_edges_do_not_show_is_uncertain(normals, oval, text):
         return gaussian_edge(np.hypot(14e-6 * cos(turned), 8e-6 * np.sin(turned)))
 
     found = knife_edge([an_image(one, edge(one), seed=k) for k, one in enumerate(normals)])
-    assert found.oval == pytest.approx(oval, abs=0.002)
+    assert found.oval == pytest.approx(oval, abs=0.001)  # by the noise: 0.0004 measured
     assert text in " ".join(found.notes.assumed)
     true = sqrt(14e-6 * 8e-6)
     assert abs(found.fwhm - true) < 1.96 * found.fwhm_uncertainty
@@ -269,7 +274,8 @@ def test_apertures_tell_of_tails_that_an_edge_does_not():
     assert together.best is fraction
     # The images of apertures have no footprint, which adds under 1 % at the smallest.
     assert fraction.values[1] == pytest.approx(0.1, abs=0.01)
-    assert fraction.values[2] * fraction.values[0] == pytest.approx(60e-6, rel=0.1)
+    # By the noise: 0.06 % measured.
+    assert fraction.values[2] * fraction.values[0] == pytest.approx(60e-6, rel=0.01)
     unsure = alone.fit("gaussian with tail").uncertainties[1]
     assert fraction.uncertainties[1] < 0.3 * unsure
 
@@ -326,7 +332,7 @@ def test_tilts_that_sample_the_edge_too_coarsely_are_doubtful(normal, aliased):
 
 def test_without_noise_the_truth_is_returned_and_nothing_is_doubtful(clean):
     found = knife_edge([an_image(noise=0.0)])
-    assert found.fwhm == pytest.approx(FWHM, rel=1e-4)
+    assert found.fwhm == pytest.approx(FWHM, rel=2e-5)  # kernels and table of the edge: 3e-6
     assert found.notes.warnings == clean.notes.warnings == []
 
 
@@ -373,7 +379,8 @@ def test_dead_pixels_change_nothing_flagged_or_not(clean):
     radiance[[3, 17, 30], [8, 20, 35]] = 60.0, 0.0, -40.0
     found = knife_edge([replace(image, radiance=radiance)])
     assert any("3 pixels far from the others" in warning for warning in found.notes.warnings)
-    assert found.fwhm == pytest.approx(clean.fwhm, abs=clean.edge_uncertainty / 2)
+    # Three pixels of 1600 are missing: 1/30 measured.
+    assert found.fwhm == pytest.approx(clean.fwhm, abs=clean.edge_uncertainty / 8)
     dead = np.zeros_like(image.dead)
     dead[[3, 17, 30], [8, 20, 35]] = True
     flagged = knife_edge([replace(image, radiance=radiance, dead=dead)])
@@ -386,7 +393,8 @@ def test_models_are_weighed_and_named(clean):
     assert clean.weights[0] > 0.75
     assert [fit.bic for fit in clean.fits] == sorted(fit.bic for fit in clean.fits)
     assert clean.edge_uncertainty >= clean.best.fwhm_uncertainty
-    assert clean.psf(model="gaussian with tail").fwhm == pytest.approx(FWHM, rel=0.1)
+    # The tail takes part of the noise: 0.8 % measured.
+    assert clean.psf(model="gaussian with tail").fwhm == pytest.approx(FWHM, rel=0.03)
     assert all(isinstance(fit.model, PSFModel) for fit in clean.fits)
 
 
@@ -411,23 +419,23 @@ def test_a_measurement_becomes_an_image():
 
 
 def test_symmetric_edges_are_not_called_curved_and_a_known_curve_is():
-    """Of 30 standard normal numbers, one is beyond 4 with a probability of 0.2 %."""
+    """Of 12 standard normal numbers, one is beyond 4 with a probability of 0.08 %."""
     edges = [GAUSSIAN, tailed_edge(8e-6, 0.2, 20e-6), disc_edge(12e-6)]
     scores = []
-    for seed in range(10):
+    for seed in range(4):
         for edge in edges:
             found = knife_edge([an_image(3.0 + seed, edge, 0.05, seed)])
             scores.append(_asymmetry(found))
     z = [one.value / one.standard_uncertainty for one in scores]
-    assert max(map(abs, z)) < 4
-    assert np.std(z) < 1.3
+    assert max(map(abs, z)) < 4  # four standard deviations of all scores
+    assert np.std(z) < 1.4  # the standard deviation of that of 12 numbers is 0.2
     assert not any(one.is_clear for one in scores)
     # E + q 4 E (1 − E): the curve is in part a shift of the edge, which takes away some of q.
     fraction = edge_radiance(GAUSSIAN, 5.0, background=0.0, step=1.0)
     curved = image_of(2.0 + 5.0 * (fraction + 0.1 * 4 * fraction * (1 - fraction)), 0.01)
     found = _asymmetry(knife_edge([curved]))
     assert found.is_clear
-    assert found.value == pytest.approx(0.1, rel=0.25)
+    assert found.value == pytest.approx(0.1, rel=0.25)  # the shift takes that away: 0.0175 measured
 
 
 def _asymmetry(found):

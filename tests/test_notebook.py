@@ -78,10 +78,15 @@ def test_a_notebook_shows_the_data_the_budget_and_the_study():
 
 
 def test_degrees_celsius_of_a_frame():
-    np.testing.assert_allclose(scene().celsius(-1)[7], 302.0 + RASTER.x * 1e6, atol=1e-4)
-    # The band's table and its inverse: under 1 mK.
-    np.testing.assert_allclose(measurement().celsius(), [[426.85, 527.0, np.nan]], atol=1e-3)
-    np.testing.assert_allclose(measurement().celsius(1), [[427.85, 527.85, 628.0]], atol=1e-3)
+    # Float32 of 600 K.
+    np.testing.assert_allclose(scene().celsius(-1)[7], 302.0 + RASTER.x * 1e6, atol=5e-5)
+    # The band's table and its inverse: 2e-8 K measured.
+    np.testing.assert_allclose(
+        measurement().celsius(), [[426.85, 527.0, np.nan]], rtol=0, atol=1e-7
+    )
+    np.testing.assert_allclose(
+        measurement().celsius(1), [[427.85, 527.85, 628.0]], rtol=0, atol=1e-7
+    )
 
 
 @pytest.mark.parametrize(

@@ -94,6 +94,7 @@ def test_veil_of_a_disc():
     # A disc of squares of 2 um.
     assert image[135, 150] / 400 == pytest.approx(expected, abs=2e-4)
     assert image[135, 5] > 0.2
+    # Sums of 1e5 weights: 3e-10 measured.
     np.testing.assert_allclose(seen(even(800.0), cam.Veil(0.3, 1e-3)), even(800.0)[0, 0], rtol=1e-9)
     np.testing.assert_array_equal(seen(disc, cam.Veil(0.0, half)), seen(disc))
 

@@ -241,6 +241,7 @@ WAITS = """
 import signal, sys, time
 from chipglow import cli
 from chipglow.io import atomic_folder
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # not ignored, as under nohup
 def command():
     with atomic_folder(sys.argv[1]) as part:
         (part / "summary.json").touch()

@@ -82,10 +82,11 @@ def test_the_fraction_is_that_of_the_area(study, state):
     assert float(data[other]) == 0.0
     # The error is the mean over all of them, by the temperature of their radiance.
     expected = measurement.radiance_temperature(flagged=True)[0][inside].mean()
-    assert float(data.measured.sel(effects="all").squeeze()) == pytest.approx(expected, abs=1e-6)
+    # Rounding of means of radiances.
+    assert float(data.measured.sel(effects="all").squeeze()) == pytest.approx(expected, abs=1e-9)
 
 
-def test_error_report_budget_and_design_state_the_same_fraction(study, state):
+def test_error_report_budget_and_design_state_the_same_fraction(study, state, few_draws):
     said = sentence(state)
     analysis = errors(study)
     assert f"Pad (uniform): {said}." in analysis.warnings

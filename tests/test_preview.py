@@ -285,7 +285,7 @@ def test_the_movie_of_frames_is_of_their_pictures(tmp_path, picture):
         # The palette has every third colour of the maps and thirty greys, for all but the
         # smoothed edges of lines on a colour.
         far = np.abs(found - picture.draw(frame).astype(float)).max(axis=2) > 20
-        assert far.mean() < 0.005
+        assert far.mean() < 0.005  # lines and their edges; 0.003 measured
 
 
 @pytest.fixture

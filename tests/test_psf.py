@@ -53,6 +53,7 @@ def test_the_sum_of_a_kernel_is_the_light_that_it_holds(psf, spacing):
     # The square holds more than the circle in it: beyond it are 4 √2 / 2π = 0.9 of what is beyond
     # the circle, or less by what a last square sticks out.
     assert held - 1e-12 <= kernel.sum() <= 1 + 1e-12
+    # That last square: 0.3 of what is beyond measured.
     assert kernel.sum() == pytest.approx(held + 0.1 * (1 - held), abs=0.5 * (1 - held) + 1e-12)
 
 

@@ -56,7 +56,7 @@ def test_the_command_prints_and_writes_the_best_model(folder):
     output = psf("edge.nc other.nc --out psf.nc")
     width, uncertainty = found_width(output)
     assert abs(width - 10.0) < 3 * across(output) < 0.3
-    assert uncertainty == pytest.approx(0.64, abs=0.02)
+    assert uncertainty == pytest.approx(0.64, abs=0.005)  # printed with two digits
     assert "kind: gaussian, fwhm: " in output
     assert "they agree" in output
     assert "Assumed: The whole square of a pixel takes light" in output
@@ -64,12 +64,14 @@ def test_the_command_prints_and_writes_the_best_model(folder):
     assert output.rstrip().endswith("psf.nc")
     camera = Study(camera={"psf": {"kind": "measured", "file": "psf.nc"}}).camera.build()
     assert isinstance(camera.psf, MeasuredPSF)
-    assert camera.psf.fwhm == pytest.approx(10e-6, rel=0.03)
+    # By samples of the kernel: 0.2 % measured.
+    assert camera.psf.fwhm == pytest.approx(10e-6, rel=0.01)
     data = xr.load_dataset("psf.nc", engine="h5netcdf")
     assert data.attrs["model"] == "gaussian"
     assert data["edge1_esf"].size == data["edge1_distance"].size
     assert data["edge1_mtf"].attrs["units"] == "1"
-    assert data["gaussian"].values == pytest.approx([10e-6], rel=0.03)
+    # By the noise: 0.05 % measured.
+    assert data["gaussian"].values == pytest.approx([10e-6], rel=0.002)
     assert data["gaussian_covariance"].shape == (1, 1)
 
 
@@ -135,7 +137,7 @@ def test_a_blade_colder_than_the_calibration_serves_for_an_edge(folder):
         "parameters: {offset: 300, gain: 4}\ncovariance: [[1, 0], [0, 0.01]]\n"
     )
     output = psf(f"edge.npy {COUNTS} --set calibration=calibration.yaml")
-    assert abs(found_width(output)[0] - 10.0) < 0.6
+    assert abs(found_width(output)[0] - 10.0) < 0.1  # in um, as printed: no difference measured
     assert "Warning" not in output
 
 
@@ -144,6 +146,7 @@ def test_a_measurement_under_the_cameras_range_serves_for_an_edge(folder):
     flags[0, :, :20] = Flag.UNDER_RANGE
     write_edge(folder / "cold.nc", flags=flags)
     output = psf("cold.nc")
+    # The same pixels: printed alike.
     assert found_width(output)[0] == pytest.approx(found_width(psf("edge.nc"))[0], abs=1e-3)
     assert "Assumed: 50 % of the pixels of cold.nc are below the range" in output
 
@@ -157,7 +160,8 @@ def test_the_fill_factor_of_a_cameras_file_is_taken(folder):
     small = found_width(psf(f"edge.npy {COUNTS} --set fill_factor=0.36"))[0]
     # The optics are wider if the pixel adds less: squares of the sides, as of a box, over 12.
     sides = (6.0**2 - 3.6**2) * 8 * np.log(2) / 12
-    assert small**2 - whole**2 == pytest.approx(sides, rel=0.1)
+    # Two fits, each with its noise: 4 % measured.
+    assert small**2 - whole**2 == pytest.approx(sides, rel=0.08)
     assert "fill_factor" in psf(f"edge.npy {COUNTS} --set fill_factor=2", code=2)
 
 

@@ -48,7 +48,7 @@ def test_the_fit_s_part_is_that_of_a_wider_and_a_narrower_gaussian(gaussian):
     )
     expected = np.abs(np.outer(wide, wide) - np.outer(narrow, narrow)) / 2
     found = psf.estimate.contribution("psf fit")
-    np.testing.assert_allclose(found, expected, atol=1e-6 * expected.max())
+    np.testing.assert_allclose(found, expected, atol=1e-10 * expected.max())  # rounding of sums
     # All the light is there, whatever is uncertain.
     assert psf.estimate.sum().standard_uncertainty == pytest.approx(0.0, abs=1e-12)
 
@@ -84,7 +84,8 @@ def test_the_parts_are_those_of_the_width():
         for error in component.effects.T.reshape(-1, *psf.weights.shape):
             ends = [MeasuredPSF(psf.weights + sign * error, psf.spacing).fwhm for sign in (-1, 1)]
             changes.append((ends[1] - ends[0]) / 2)
-    assert np.hypot.reduce(changes) == pytest.approx(found.edge_uncertainty, rel=0.1)
+    # Widths are not linear in the components: 2 % measured.
+    assert np.hypot.reduce(changes) == pytest.approx(found.edge_uncertainty, rel=0.05)
 
 
 def test_components_are_scaled_with_the_weights():

@@ -99,7 +99,7 @@ def test_float32_stays_float32_and_keeps_the_shape():
     assert radiance.dtype == np.float32
     assert radiance.shape == (3, 4)
     # float32 has 24 bits: at 1500 K its step is 0.1 mK, and the radiance adds as much.
-    np.testing.assert_allclose(MID_WAVE.temperature(radiance), temperature, atol=1e-3)
+    np.testing.assert_allclose(MID_WAVE.temperature(radiance), temperature, atol=3e-4)
 
 
 def test_what_has_no_answer_is_nan():
@@ -109,8 +109,8 @@ def test_what_has_no_answer_is_nan():
 
 def test_response_is_applied():
     whole = Band(3e-6, 5e-6, response=lambda w: np.where(w > 4e-6, 1.0, 0.0))
-    # A step inside one of 64 panels: an error of less than a panel's fraction of the radiance.
-    assert whole.radiance(900.0) == pytest.approx(Band(4e-6, 5e-6).radiance(900.0), rel=0.01)
+    # The step lies between two of 64 panels: rounding.
+    assert whole.radiance(900.0) == pytest.approx(Band(4e-6, 5e-6).radiance(900.0), rel=DOUBLE)
     half = Band(3e-6, 5e-6, response=lambda w: np.full_like(w, 0.5))
     assert half.radiance(900.0) == pytest.approx(0.5 * Band(3e-6, 5e-6).radiance(900.0), rel=DOUBLE)
 
@@ -132,8 +132,8 @@ def test_wide_band_obeys_stefan_boltzmann():
 def test_object_parameters_are_taken_back(temperature, emissivity, reflected, transmittance, air):
     told = ObjectParameters(emissivity, reflected, transmittance, air)
     received = told.apparent_radiance(temperature, MID_WAVE)
-    # The band's table and its inverse are each within 1e-6 of the integral.
-    assert told.temperature(received, MID_WAVE) == pytest.approx(temperature, rel=1e-5)
+    # The inverse of the band's table: 7e-11 measured.
+    assert told.temperature(received, MID_WAVE) == pytest.approx(temperature, rel=1e-9)
 
 
 def test_a_gray_object_without_surroundings_sends_its_share_of_a_black_body():

@@ -61,6 +61,7 @@ def test_view_factor_of_a_groove(angle):
 def test_view_factor_of_opposite_strips():
     exchange = Exchange(*lines([[1, 0.7], [0, 0.7]], [[0, 0], [1, 0]]))
     expected = np.hypot(1, 0.7) - 0.7  # within two of 2048 rays
+    # Two of 2048 rays.
     np.testing.assert_allclose(view_factors(exchange)[[0, 1], [1, 0]], expected, atol=1e-3)
 
 
@@ -164,6 +165,7 @@ def test_parallel_plates(mirror):
     found = exchange.incident(black, emissivity, 0.0, [mirror, 1.0, mirror, 1.0])
     flux = emissivity * (black - found)
     expected = 3.0 / (1 / 0.3 + 1 / 0.6 - 1)
+    # Those permille, and two of 2048 rays: 0.26 % measured.
     np.testing.assert_allclose(flux[[0, 2]], [expected, -expected], rtol=4e-3)
 
 
@@ -208,7 +210,7 @@ def test_energy_is_conserved(first, second, angle, surroundings):
 def test_the_wedge_is_as_wide_and_deep_as_its_arc():
     wedge = Wedge(angle=np.radians(30), bulge_radius=80e-6, overhang=5e-6)
     side = wedge.outline
-    np.testing.assert_allclose(side[0], [0, -45e-6], atol=DOUBLE * 45e-6)
+    np.testing.assert_allclose(side[0], [0, -45e-6], atol=DOUBLE * 45e-6)  # rounding
     np.testing.assert_allclose(side[-1], [80e-6 * np.cos(np.radians(30)), -5e-6])
     first = side[1] - side[0]
     # The first chord of 24, graded as the square, is a 1152th of the arc's turn from its tangent.
@@ -307,6 +309,7 @@ def test_what_the_camera_sees_of_a_chip_beside_a_black_tool(rake):
     inside = (material == Material.WORKPIECE) & (depth < 200e-6) & (along > 0)
     seen = float(BAND.radiance(WARM)) * straight(30e-6, depth)
     expected = CHIP * float(BAND.radiance(HOT)) + (1 - CHIP) * seen
+    # Rays and cells along the face: 0.3 % measured.
     np.testing.assert_allclose(found[inside], expected[inside], rtol=5e-3)
     lit = expected[inside] / (CHIP * float(BAND.radiance(HOT)))
     assert lit.max() > 1.05  # the tolerance is a small part of what is added

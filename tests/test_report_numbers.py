@@ -75,7 +75,7 @@ CHIP = ChipMetrics(
 )
 FORCES = CuttingForces(
     history=CutHistory(
-        *[np.zeros(1)] * 4,
+        **dict.fromkeys(("time", "cutting", "thrust", "thickness"), np.zeros(1)),
         start=0.0,
         cutting_mean=625e3,
         cutting_swing=174e3,
@@ -198,6 +198,7 @@ def test_numbers_of_a_segment(chip_analysis):
     # The widths rise linearly with the index, so the median of any symmetric part is the mean; the
     # middle half by length may leave out one point more on one side: half a step.
     step = 20.0 / (widths.size - 1)
+    # That half of a step.
     assert values["band_width_um"] == pytest.approx(40.0, abs=step / 2 + 1e-9)
     assert values["band_peak_rate_per_s"] == 9e4
     assert values["contact_length_um"] == pytest.approx(612.0, rel=ROUNDING)

@@ -70,7 +70,7 @@ def test_an_even_plate_is_measured_without_error():
     result = found(even, places=(MIDDLE, ACROSS))
     for place, name in (("middle", "pixel"), ("across", "mean"), ("hottest pixel", "peak")):
         error = reading(result, place, name).error
-        assert np.abs(error.values).max() < 1e-3, place
+        assert np.abs(error.values).max() < 1e-9, place  # rounding: the same table there and back
         assert error.values.shape == (2, 1, 4)
 
 
@@ -109,7 +109,8 @@ def test_the_pixel_phase_scatters_at_the_edge_and_not_far_from_it():
     result = found(places=(near, MIDDLE), phases=4)
     assert reading(result, "near", "pixel").error.parts["pixel phase"].fraction > 0.99
     assert np.ptp(reading(result, "near", "pixel").error.values) > 5.0
-    assert np.ptp(reading(result, "middle", "pixel").error.values) < 0.5
+    # Far from the edge the field is even.
+    assert np.ptp(reading(result, "middle", "pixel").error.values) < 1e-9
 
 
 def test_emissivity_follows_the_temperature():
@@ -218,9 +219,10 @@ def test_the_command_reports_without_a_word_of_cutting(folder, reported):
     here = reading(errors, "across", "most negative").error.mean
     key = "across_most_negative_error_degC"
     # The file's temperatures are rounded to 1/40 K.
-    assert summary["results"][key] == pytest.approx(here, abs=0.1)
+    assert summary["results"][key] == pytest.approx(here, abs=0.03)
     assert summary["draws"][key]["count"] == 8
-    assert summary["references"][key] == pytest.approx(518.0, abs=1.0)
+    # 518 is rounded: 0.3 K measured.
+    assert summary["references"][key] == pytest.approx(518.0, abs=0.5)
     with xr.open_dataset(folder / "out" / "results.nc", engine="h5netcdf") as data:
         assert data["line_error"].sel(line="across").sizes["pixel_phase"] == 4
         assert all(data[name].attrs.get("units") for name in data.data_vars)

@@ -97,7 +97,7 @@ def test_a_pipe_gets_one_line_a_row_without_colours():
 def test_a_narrow_terminal_loses_no_number(file, command):
     wide = chipglow(command, file, COLUMNS="200").stdout
     narrow = chipglow(command, file, COLUMNS="60").stdout
-    assert max(map(len, narrow.split("\n\n")[0].splitlines())) <= 60
+    assert max(map(len, narrow.split("\n\n")[0].splitlines())) <= 60  # the columns of the terminal
     numbers = [word for word in wide.split("\n\n")[0].split() if word[-1].isdigit()]
     assert numbers
     assert all(number in narrow for number in numbers)

@@ -60,7 +60,8 @@ def test_a_hotter_holder_and_a_narrow_cut_shift_as_they_should():
     _, _, _, hot = wedge(-7.0, body=replace(BODY, holder_temperature=393.15))
     _, _, _, narrow = wedge(-7.0, body=replace(BODY, width=1e-3))
     tool = fraction > 0
-    assert hot[tool] - usual[tool] == pytest.approx(100.0, abs=1e-6)
+    # Rounding of a linear solution.
+    assert hot[tool] - usual[tool] == pytest.approx(100.0, abs=1e-9)
     # Heat per width: a narrow cut spreads sideways sooner.
     assert (narrow[tool] < usual[tool]).all()
 
@@ -71,7 +72,8 @@ def test_the_field_is_taken_over_to_a_finer_grid():
     fine, of_fine, distance, expected = wedge(-7.0, cell=10e-6)
     taken = steady.on(fine, of_fine)
     tool = (of_fine > 0.99) & (distance > 0.15e-3)
-    assert np.abs(taken[tool] / expected[tool] - 1).max() < 0.02
+    # Between nodes of twice the spacing: 0.4 % measured.
+    assert np.abs(taken[tool] / expected[tool] - 1).max() < 0.01
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +89,7 @@ def cold():
 def test_a_long_cut_settles_and_the_next_one_begins_warm(cold):
     simulation = replace(cold, tool_temperature=BODY)
     steady = simulation.steady_tool()
-    assert np.ptp(steady.rounds[-3:]) < 1.0
+    assert np.ptp(steady.rounds[-3:]) < 1.0  # in K: the stated tolerance
     hottest = steady.temperature.max()
     assert 800.0 < hottest < 1733.0
     window = OutputWindow(0.1e-3, 0.3e-3, 10e-6, later_bands=0)
@@ -110,7 +112,7 @@ def test_a_tool_of_a_given_temperature_begins_with_it(cold):
     x, y = np.meshgrid(raster.x, raster.y)
     inside = simulation.tool.signed_distance(x, y) < -150e-6
     assert inside.sum() > 10
-    assert frames[0].temperature[inside] == pytest.approx(573.15, abs=0.01)
+    assert frames[0].temperature[inside] == pytest.approx(573.15, abs=1e-4)  # float32 of 573 K
 
 
 def test_without_a_body_no_tool_is_steady(cold):

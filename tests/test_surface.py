@@ -121,13 +121,14 @@ def test_low_and_high_emissivities_keep_mean_and_deviation_within_0_to_1(mean, s
     values = np.concatenate([samples(map_).ravel() for map_ in maps])
     assert not Emissivity(mean, standard_deviation).is_normal
     assert values.min() >= 0.0
-    assert values.max() <= 1.0
+    assert values.max() <= 1.0  # no emissivity is beyond these
     # What would be cut off is 11 % of the first; of a beta distribution float32 rounds a few.
     assert ((values == 0.0) | (values == 1.0)).mean() < 1e-3
     # 12 x 16384 deviates: four standard errors of the mean, and as much of a deviation whose
     # fourth moment is under eight times that of a normal distribution.
     error = 1.25 * standard_deviation / (MAP_SIZE * np.sqrt(12))
-    assert values.mean() == pytest.approx(mean, abs=4 * error)
+    assert values.mean() == pytest.approx(mean, abs=4 * error)  # four standard errors
+    # Four standard errors, at most.
     assert values.std() == pytest.approx(standard_deviation, abs=4 * error * 2)
 
 

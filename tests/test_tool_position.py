@@ -81,14 +81,15 @@ def test_a_comparison_has_the_uncertainty_of_the_tool_s_place():
     expected = np.hypot(3.0, grid.frame_estimate.standard_uncertainty)
     # Frames that are alike: nothing else, not the pixel's position either.
     np.testing.assert_allclose(
-        result.grid.measured.standard_uncertainty[known], expected[known], rtol=1e-3
+        result.grid.measured.standard_uncertainty[known], expected[known], rtol=1e-12
     )
     # The curve is laid on the simulation by the edge, so that it is off with it in any direction.
     moves = FOUND.displacements(TOOL, TOOL.edge_point) @ SLOPE
     pixel = RASTER.spacing / np.sqrt(12.0) * np.hypot(*SLOPE)
     known = np.isfinite(result.band.measured.values)
+    # A field that is linear, but for rounding: 2e-10.
     np.testing.assert_allclose(
-        result.band.measured.standard_uncertainty[known], hypot(3.0, pixel, *moves), rtol=1e-3
+        result.band.measured.standard_uncertainty[known], hypot(3.0, pixel, *moves), rtol=1e-8
     )
     assert not result.grid.simulated[0].only("tool").components
 
@@ -102,9 +103,10 @@ def test_a_tool_that_is_off_moves_all_squares_together():
     each = compare(linear(), {"same": linear()}, TOOL, CURVE, own)
     expected = 16e-6 * abs(SLOPE @ UP)
     together, apart = result.fits[:2], each.fits[:2]
-    np.testing.assert_allclose(together["bias_standard_uncertainty_K"], expected, rtol=1e-3)
+    # Beside 16 um the other parts of the uncertainty are 1e-3 K.
+    np.testing.assert_allclose(together["bias_standard_uncertainty_K"], expected, rtol=2e-6)
     single = 16e-6 * np.hypot(*SLOPE) / np.sqrt(apart["values"])
-    np.testing.assert_allclose(apart["bias_standard_uncertainty_K"], single, rtol=1e-2)
+    np.testing.assert_allclose(apart["bias_standard_uncertainty_K"], single, rtol=2e-5)  # likewise
 
 
 @pytest.mark.parametrize(("turned", "doubted"), [(2.9, False), (3.1, True)])

@@ -178,7 +178,7 @@ def test_what_is_equal_has_no_difference(one):
         # Of values up to 100.
         np.testing.assert_allclose(difference.standard_uncertainty, 0.0, atol=100 * DOUBLE)
     total = one[0] + one[1] + one[2] + one[3] - one.sum()
-    assert total.standard_uncertainty == pytest.approx(0.0, abs=100 * DOUBLE)
+    assert total.standard_uncertainty == pytest.approx(0.0, abs=100 * DOUBLE)  # of values up to 100
 
 
 @given(ESTIMATES, st.integers(0, 1000))

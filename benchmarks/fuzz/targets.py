@@ -16,7 +16,7 @@ from seeds import source_of, write_seeds
 from chipglow.cutting import workpiece
 from chipglow.io import import_description, import_text, open_scene, write_scene
 from chipglow.io.cameras import read_recording
-from chipglow.io.sandbox import Isolated
+from chipglow.io.sandbox import Isolated, Sandbox
 from chipglow.laboratory.recordings import MeasurementDescription, measurement_text
 from chipglow.laboratory.registration import Registration, load_registration, write_registration
 from chipglow.scene import Raster, Scene
@@ -107,7 +107,7 @@ def target_of(folder, name):
         read = partial(read_recording, path)
         return Target(read, read)
     source = source_of(folder, name)
-    return Target(partial(sample, source), partial(sample, Isolated(source, name)))
+    return Target(partial(sample, source), partial(sample, Isolated(source, Sandbox(name))))
 
 
 def sample(source):

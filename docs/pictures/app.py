@@ -12,10 +12,17 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+import chipglow
+from chipglow.study import fit
 
 HERE = Path(__file__).parent
 CHROMIUM = os.environ.get("CHIPGLOW_CHROMIUM") or shutil.which("chromium")
 FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking")
+FRAMES = 12
 SIZES = ((1280, 800), (1920, 1080))
 
 
@@ -33,6 +40,7 @@ def main(folder):
         if folder is None:
             take(browser, url, SIZES[0], "light", HERE / "app.png")
             take_correction(browser, url, HERE / "app-correction.png")
+            take_measuring(browser, HERE / "app-measure.png")
         else:
             for size in SIZES:
                 for theme in ("light", "dark"):
@@ -67,6 +75,82 @@ def take_correction(browser, url, file):
     page.wait_for_timeout(1000)
     page.screenshot(path=file)
     page.close()
+
+
+def take_measuring(browser, file):
+    """Take the picture of places on frames of a camera, and what they measure."""
+    with TemporaryDirectory() as folder:
+        measurement = Path(folder, "chip.nc")
+        chipglow.write_measurement(frames(), measurement)
+        command = [sys.executable, "-m", "chipglow", "app", str(measurement), "--no-browser"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, encoding="utf-8") as server:
+            url = re.search(r"http://\S+", server.stdout.readline())[0]
+            draw_places(browser, url, file)
+            server.terminate()
+
+
+def frames():
+    """Return frames of the paper's camera and its first chip, on the scene of the app."""
+    study, scene = chipglow.Study(), chipglow.example_scene()
+    fitted = fit(study, scene)
+    camera = study.camera.on(fitted.scene.raster, study.seed)
+    first, *_, last = fitted.scene.times
+    starts = np.linspace(first, last - camera.frame_duration(fitted.scene.raster), FRAMES)
+    return camera.measure(fitted.scene, next(iter(fitted.surfaces.values())), starts)
+
+
+def draw_places(browser, url, file):
+    """Draw places on the page of a measurement and take its picture."""
+    width, _ = SIZES[0]
+    page = browser.new_page(viewport={"width": width, "height": 1500}, color_scheme="light")
+    page.set_default_timeout(180_000)
+    page.goto(url)
+    page.locator("#status", has_text="Measured image").wait_for()
+
+    def choose(tool):
+        page.get_by_role("button", name=tool, exact=True).click()
+
+    def drag(*points):
+        for number, (x, y) in enumerate(points):
+            page.mouse.move(*place(page, x, y))
+            if number == 0:
+                page.mouse.down()
+        page.mouse.up()
+        page.wait_for_timeout(1000)
+
+    choose("Box")
+    drag((-75, 90), (-40, 130), (-5, 170))
+    choose("Circle")
+    drag((-40, 260), (-20, 270), (0, 280))
+    choose("Line")
+    drag((-150, 60), (-60, 180), (20, 330))
+    choose("Point")
+    page.mouse.click(*place(page, -20, 30))
+    page.wait_for_function(
+        "() => Bokeh.documents[0].get_model_by_name('over_time').data.name.length === 4"
+    )
+    isotherm = page.get_by_label("Isotherm / °C")
+    isotherm.fill("500")
+    isotherm.press("Enter")
+    page.wait_for_timeout(2000)
+    page.mouse.move(0, 0)
+    page.evaluate("scrollTo(0, 0)")
+    page.wait_for_timeout(500)
+    page.screenshot(path=file)
+    page.close()
+
+
+def place(page, x, y):
+    """Return where a point of the measured image in µm is on the screen."""
+    return page.evaluate(
+        """([x, y]) => {
+          const model = Bokeh.documents[0].get_model_by_name("measured_figure");
+          const view = Bokeh.index.find_one_by_id(model.id);
+          const box = view.canvas_view.el.getBoundingClientRect();
+          return [box.x + view.frame.x_scale.compute(x), box.y + view.frame.y_scale.compute(y)];
+        }""",
+        [x, y],
+    )
 
 
 if __name__ == "__main__":

@@ -46,7 +46,7 @@ from chipglow.analysis.ratio import (
 )
 from chipglow.analysis.reductions import (
     Headline as Headline,
-    OneDraw as OneDraw,
+    ReadingErrors as ReadingErrors,
     headline as headline,
     headlines as headlines,
     image_error as image_error,

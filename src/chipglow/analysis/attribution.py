@@ -24,6 +24,9 @@ REST: Final = "other effects"
 MAX_EXACT: Final = 8
 """Number of effects up to which all combinations are computed."""
 
+PERMUTATIONS: Final = 64
+"""Sampled orders of more effects, unless stated: each effect is scattered by 1/8 of its spread."""
+
 AttributionReference: TypeAlias = Literal["true-maximum", "maximum"]
 _Coalition: TypeAlias = frozenset[str]
 _EFFECTS: Final = tuple(
@@ -65,7 +68,7 @@ class AttributionPlan(Part):
         Parameter(
             f"Orders of the effects that are sampled if there are over {MAX_EXACT}.", least=4
         ),
-    ] = 64
+    ] = PERMUTATIONS
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -80,7 +83,7 @@ def attribute(
     start: float | None = None,
     effects: Sequence[str] = (),
     reference: AttributionReference = "true-maximum",
-    permutations: int = 64,
+    permutations: int = PERMUTATIONS,
     seed: int = 0,
     check: Check | None = None,
 ) -> xr.Dataset:

@@ -46,6 +46,7 @@ from chipglow.chip import (
     resolution_warnings,
 )
 from chipglow.quantities import Array, Brief
+from chipglow.radiometry import blackbody_radiance
 from chipglow.scene import FIELD_UNITS, Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.frame import FILLED, QUALITY
 from chipglow.scene.tool_outline import tool_attributes
@@ -549,7 +550,7 @@ def _corrected(camera: Camera, data: xr.Dataset) -> Variables:
     band = camera.band
     reflected = surroundings_radiance(band, camera.reflected)
     measured = data.measured.values[..., 0]
-    light = (band.radiance(np.nan_to_num(measured)) - (1 - set_to) * reflected) / set_to
+    light = blackbody_radiance(band.radiance(np.nan_to_num(measured)), set_to, reflected)
     shown = np.where(
         np.isfinite(measured), band.temperature(np.maximum(light, _LEAST_LIGHT)), np.nan
     )

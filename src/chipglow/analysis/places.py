@@ -13,7 +13,7 @@ from chipglow.analysis.images import Stack
 from chipglow.chip import ShearBand
 from chipglow.quantities import Array
 from chipglow.scene import Line, Raster, Region, Tool, sample, straight_line
-from chipglow.scene.lines import nearest
+from chipglow.scene.lines import nearest, polyline
 from chipglow.scene.regions import Point
 
 _EXTREMES: Final = ("mean", "most negative", "greatest")
@@ -239,14 +239,6 @@ class BandPlace(Place):
 
     def outline(self) -> NDArray[np.float64]:
         return self.band.ridge.points
-
-
-def polyline(corners: NDArray[np.float64], pitch: float) -> Line:
-    """Return points every half pixel from corner to corner, shape (n, 2)."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
-    distance = np.linspace(0.0, along[-1], max(round(2 * along[-1] / pitch), 1) + 1)
-    points = [np.interp(distance, along, coordinate) for coordinate in corners.T]
-    return Line(distance, np.stack(points, axis=1))
 
 
 def _lowest_near(distance: NDArray[np.float64], values: Stack, pitch: float) -> int:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Generic, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -14,21 +14,30 @@ from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 
 _DRAWS = ("exposure", "texture", "pixel_phase")
 
+Value = TypeVar("Value")
+"""Errors over all draws, or of a single frame."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Headline(Brief):
+class ReadingErrors(Brief, Generic[Value]):
+    """Errors of one reading in K of radiance temperature."""
+
+    error: Value
+    psf_portion: Value
+    true_error: Value
+    """Radiance temperature minus the largest true temperature in the pixel."""
+    corrected_error: Value
+    """The same, with the emissivity set in the camera."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Headline(ReadingErrors[Distribution]):
     """One reading over all draws, in K of radiance temperature."""
 
     place: str
     quantity: str
     surface: str
     reference: Distribution
-    error: Distribution
-    psf_portion: Distribution
-    true_error: Distribution
-    """Radiance temperature minus the largest true temperature in the pixel."""
-    corrected_error: Distribution
-    """The same, with the emissivity set in the camera."""
 
     @property
     def psf_fraction(self) -> Distribution | None:
@@ -38,15 +47,6 @@ class Headline(Brief):
             return None
         part = self.error.having(self.psf_portion.values / self.error.values)
         return replace(part, limits=(0.0, 1.0))
-
-
-class OneDraw(NamedTuple):
-    """One reading of a single frame, in K of radiance temperature; NaN where it is unknown."""
-
-    error: float
-    psf_portion: float
-    true_error: float
-    corrected_error: float
 
 
 def error(data: xr.Dataset, kind: str = "", effects: str = ALL) -> xr.DataArray:
@@ -67,7 +67,7 @@ def headline(data: xr.Dataset, reading: str) -> Headline | None:
         return None
     one = data[["reference", "measured", "true", "corrected"]].sel(reading=reading)
     one = one.isel(texture=slice(int(one.textures)))
-    values = [array.transpose(*_DRAWS).values for array in (one.reference, *_errors(one))]
+    values = [array.transpose(*_DRAWS).values for array in (*_errors(one), one.reference)]
     if not np.isfinite(values).all():
         return None
     causes = (str(data.exposure.attrs["title"]), "texture", PIXEL_PHASE)
@@ -75,9 +75,10 @@ def headline(data: xr.Dataset, reading: str) -> Headline | None:
         str(one[name].item()) for name in ("place", "quantity", "seen_surface", "undrawn")
     )
     missing = tuple(filter(None, undrawn.split(", ")))
-    return Headline(
-        place, quantity, surface, *(Distribution(array, causes, missing) for array in values)
+    wrong, portion, truly, corrected, reference = (
+        Distribution(array, causes, missing) for array in values
     )
+    return Headline(wrong, portion, truly, corrected, place, quantity, surface, reference)
 
 
 def _errors(one: xr.Dataset) -> tuple[xr.DataArray, ...]:
@@ -92,10 +93,10 @@ def headlines(data: xr.Dataset) -> dict[str, Headline]:
     return {name: one for name, one in every.items() if one is not None}
 
 
-def one_draw(data: xr.Dataset, reading: str) -> OneDraw:
-    """Return a reading of the first exposure, texture and pixel phase."""
+def one_draw(data: xr.Dataset, reading: str) -> ReadingErrors[float]:
+    """Return a reading of the first exposure, texture and pixel phase; NaN where unknown."""
     one = data.sel(reading=reading).isel(dict.fromkeys(_DRAWS, 0))
-    return OneDraw(*map(float, _errors(one)))
+    return ReadingErrors(*map(float, _errors(one)))
 
 
 def line_error(data: xr.Dataset, line: str) -> xr.DataArray:

@@ -51,7 +51,9 @@ def draw_wavelengths(data: xr.Dataset) -> Figure:
             column[0].set_title(f"{place}, {rows.truth_degC.iloc[0]:.0f} °C")
         panels[0, 0].set_ylabel("first band / µm")
         ticks = [one for one in _TICKS if low <= one <= high]
-        bar = figure.colorbar(picture, ax=panels[0], label="error / K", aspect=25, extend="max")
+        bar = figure.colorbar(
+            picture, ax=panels[0], label="error / K", aspect=drawing.BAR_ASPECT, extend="max"
+        )
         bar.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks], minor=False)
         bar.ax.minorticks_off()
         drawing.legend(figure, 3)

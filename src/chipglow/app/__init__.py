@@ -38,11 +38,19 @@ def explore(scene: "Scene | str | Path | None" = None, study: "Study | None" = N
     _check_installed()
     import panel as pn
 
-    from chipglow.app.opening import open_any
+    from chipglow.app.opening import Asking, open_any
     from chipglow.app.view import PageView
 
-    pn.extension(inline=True)  # its scripts come with it: nothing is loaded from the network
-    view = PageView(open_any(scene, study), embedded=True)
+    opened = open_any(scene, study)
+    if isinstance(opened, Asking):
+        raise ValueError(
+            f"{opened.path}: is neither a scene nor a measurement; convert it by chipglow convert "
+            "or import, or open it in chipglow app"
+        )
+    pn.extension(
+        "tabulator", inline=True
+    )  # its scripts come with it: nothing is loaded from the network
+    view = PageView(opened, embedded=True)
     view.start(None)
     return view.page
 

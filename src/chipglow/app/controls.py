@@ -1,6 +1,6 @@
 """The controls of the app: a table of paths into the study, and the study at their values."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
@@ -49,21 +49,50 @@ ERROR_IMAGES: Final[Mapping[str, str]] = {
     "texture": "Error by texture",
 }
 
-ERRORS, CORRECTION = "error", "correction"
-SHOWN_IMAGES: Final[Mapping[str, str]] = {ERRORS: "Scene and error", CORRECTION: "Correction"}
-"""Sets of three images: scene, measured and error; or measured, corrected and one more."""
+ERRORS, CORRECTION, CAMERAS = "error", "correction", "cameras"
+SHOWN_IMAGES: Final[Mapping[str, str]] = {
+    ERRORS: "Scene and error",
+    CORRECTION: "Correction",
+    CAMERAS: "Two cameras",
+}
+"""Sets of images: scene, measured and error; measured and those of the correction; or the scene
+and the images of two cameras."""
+
+SECOND: Final = "second:"
+"""Beginning of the names of values that are the second camera's."""
+
+EDITED: Final = {"first": "First camera", "second": "Second camera"}
+"""Cameras that the controls change."""
 
 CORRECTION_IMAGES: Final[Mapping[str, str]] = {
-    "half-width": "Half-width (95 %)",
+    "corrected": "Corrected temperature",
+    "half_width": "Half-width (95 %)",
     "true": "True temperature",
-    "error": "Correction error",
+    "error": "Corrected − true",
 }
+"""Titles of the images of a correction, the last two of a scene alone."""
+
+WHOLE: Final = "whole"
+PARTS: Final[Mapping[str, str]] = {
+    "48": "48 × 48 pixels",
+    "96": "96 × 96 pixels",
+    "192": "192 × 192 pixels",
+    WHOLE: "Whole frame",
+}
+"""Parts of a measured frame that are corrected, around the cursor."""
+
+REFLECTED: Final = "293 K"
+"""Reflected temperature of a measurement: the default of `chipglow.correct`."""
+
+CORRECTING: Final = ("emissivity", "camera.psf", "camera.reflected", "corrected_part")
+"""Beginnings of the paths of controls on which the correction of a measurement depends."""
 
 _ONLY_WITH: Final[Mapping[str, str]] = {
+    "edited": CAMERAS,
+    "set_emissivity": CAMERAS,
     "scene_image": ERRORS,
     "error_image": ERRORS,
     "analysis.reference": ERRORS,
-    "correction_image": CORRECTION,
     "emissivity_uncertainty": CORRECTION,
 }
 """Controls that have an effect on one kind of images alone."""
@@ -103,7 +132,20 @@ class ShownStudy(Study):
     scene_image: Annotated[str, Parameter("Image of the scene.")] = "temperature"
     error_image: Annotated[str, Parameter("Image of the error.")] = "total"
     images: Annotated[str, Parameter("Kind of images.")] = ERRORS
-    correction_image: Annotated[str, Parameter("Image of the correction.")] = "half-width"
+    emissivity: Annotated[
+        float | None,
+        Parameter("Emissivity of the measured object; none: not known.", over=0.0, most=1.0),
+    ] = None
+    edited: Annotated[str, Parameter("Camera that the controls change.")] = "first"
+    set_emissivity: Annotated[
+        float,
+        Parameter(
+            "Emissivity set in the camera, by which it computes the temperature that it shows.",
+            over=0.0,
+            most=1.0,
+        ),
+    ] = 1.0
+    corrected_part: Annotated[str, Parameter("Part of a frame that is corrected.")] = "48"
     emissivity_uncertainty: Annotated[
         float, Parameter("Standard uncertainty of the mean emissivity.", least=0.0, under=1.0)
     ] = 0.01
@@ -198,7 +240,8 @@ TABLE: Final = (
     Control("scene_image", "Scene image", "Scene"),
     Control("error_image", "Error image", "Scene"),
     Control("analysis.reference", "Error against", "Scene"),
-    Control("correction_image", "Third image", "Scene"),
+    Control("edited", "Controls of", "Camera"),
+    Control("set_emissivity", "Emissivity set", "Camera", 0.05),
     Control("camera.band.0", "Band from", "Camera", 0.8, 8.0, 0.1),
     Control("camera.band.1", "Band to", "Camera", 1.0, 14.0, 0.1),
     Control("camera.pitch", "Pixel pitch", "Camera", 1.0, 30.0, 0.5),
@@ -230,6 +273,17 @@ TABLE: Final = (
 )  # fmt: skip
 """The controls of a column in their order. One is shown while the study has its setting."""
 
+_CORRECTED: Final = (
+    Control("emissivity", "Emissivity", "Correction", 0.05),
+    Control("emissivity_uncertainty", "Uncertainty (k = 1)", "Correction", 0.0, 0.1, 0.005),
+    Control("camera.reflected", "Reflected temperature", "Correction", 0.0, 300.0, 5.0),
+    Control("camera.psf", "PSF", "Correction"),
+    Control("camera.psf.numerical_aperture", "Numerical aperture", "Correction", 0.1, 0.7),
+    Control("camera.psf.fwhm", "PSF width (FWHM)", "Correction", 1.0, 100.0, 0.5),
+    Control("corrected_part", "Part", "Correction"),
+)
+"""The controls of the correction of a measurement."""
+
 PLACES: Final = (
     Control(CURSOR, "Cursor", points=1),
     *(Control(name, f"Line {title}", points=2) for name, title in LINES.items()),
@@ -243,6 +297,8 @@ class State:
 
     texts: Texts
     study: ShownStudy = field(compare=False)
+    second: "State | None" = field(default=None, compare=False)
+    """The same state with the second camera, if two are shown."""
 
     @property
     def cursor(self) -> tuple[float, float]:
@@ -270,8 +326,6 @@ class Controls:
     def of_scene(cls, study: ShownStudy, scene: Scene, duration: float) -> "Controls":
         """Return the controls of a scene; one exposure lasts `duration`."""
         options = _options(study, scene)
-        words = (word for row in options.values() for word in row.values())
-        studies = [study, *(changed(study, word.changes) for word in words)]
         side = 1e6 * scene.raster.spacing * min(scene.raster.shape)
         exposure = 1e6 * study.camera.integration_time
         ranges: dict[str, dict[str, Any]] = {
@@ -279,22 +333,31 @@ class Controls:
             "camera.pitch": {"high": min(30.0, side)},
             EXPOSURE: {"low": exposure / 10, "high": 5 * exposure, "step": exposure / 20},
         }
-        rows = {}
-        for row in TABLE:
-            declared = [setting_at(one, row.path) for one in studies if _has(one, row.path)]
-            if declared:
-                quantity = declared[0].parameter.quantity
-                own, of_row = ranges.get(row.path, {}), options.get(row.path, {})
-                rows[row.path] = replace(row, quantity=quantity, options=of_row, **own)
+        rows = _declared(TABLE, study, options, ranges)
         return cls(study, rows | {row.path: row for row in PLACES}, scene.raster, scene)
 
     @classmethod
-    def of_measurement(cls, study: Study, times: NDArray[np.float64], raster: Raster) -> "Controls":
-        """Return the controls of a measurement: which of its frames is shown, and the places."""
+    def of_frames(cls, study: Study, times: NDArray[np.float64], raster: Raster) -> "Controls":
+        """Return the controls of frames: which of them is shown, and the places."""
         stops = tuple(rounded(1e6 * one) for one in times)
-        row = replace(TABLE[0], label="Frame began", stops=stops, quantity=INSTANT)
+        row = replace(TABLE[0], label="Frame began", group="Frame", stops=stops, quantity=INSTANT)
         rows = {row.path: row for row in (row, *PLACES)}
-        return cls(shown_study(study, start=rounded(times[0])), rows, raster)
+        return cls(shown_study(study, images=CORRECTION, start=rounded(times[0])), rows, raster)
+
+    @classmethod
+    def of_measurement(cls, study: Study, times: NDArray[np.float64], raster: Raster) -> "Controls":
+        """Return the controls of a measurement: those of its frames and of their correction."""
+        known = {"camera.psf": "none", "camera.blur": (), "camera.reflected": REFLECTED}
+        study = changed(study, known)
+        frames = cls.of_frames(study, times, raster)
+        options = {
+            "camera.psf": _first("none", _psfs("Not stated")),
+            "corrected_part": {
+                part: Option(label, {"corrected_part": part}) for part, label in PARTS.items()
+            },
+        }
+        rows = _declared(_CORRECTED, frames.study, options, {})
+        return replace(frames, rows={**frames.rows, **rows})
 
     @cached_property
     def initial(self) -> State:
@@ -311,9 +374,14 @@ class Controls:
 
     def shown(self, state: State) -> dict[str, str]:
         """Return the texts of the controls that have an effect, as their fields show them."""
+        values = self.values(state)
+        if _edits_second(state) and state.second is not None:
+            values = {path: text for path, text in values.items() if not _of_camera(path)}
+            of_second = self.values(state.second).items()
+            values |= {path: text for path, text in of_second if _of_camera(path)}
         return {
             path: self.rows[path].shown(text)
-            for path, text in self.values(state).items()
+            for path, text in values.items()
             if _ONLY_WITH.get(path, state.study.images) == state.study.images
         }
 
@@ -328,14 +396,18 @@ class Controls:
         duration = camera.on(self.raster, state.study.seed).frame_duration(self.raster)
         row = self.rows[EXPOSURE]
         room = 1e6 * (_room(self.scene, state.study.start) - duration + camera.integration_time)
+        longest = row.high if room >= row.high else row.step * floor(room / row.step)
         return {
             "start": list(_starts(self.scene, duration)) or [rounded(1e6 * state.study.start)],
-            EXPOSURE: [row.low, max(min(row.high, row.step * floor(room / row.step)), row.low)],
+            EXPOSURE: [row.low, max(longest, row.low)],
         }
 
     def state_with(self, state: State, texts: Texts) -> State:
         """Return the state with some controls at other values; a ValueError names the control."""
-        if unknown := [path for path in texts if path not in self.rows]:
+        if _edits_second(state):
+            texts = {SECOND + path if _of_camera(path) else path: texts[path] for path in texts}
+        names = {path: path.removeprefix(SECOND) for path in texts}
+        if unknown := [path for path in names.values() if path not in self.rows]:
             known = ", ".join(self.rows)
             raise ValueError(f"{unknown[0]}: unknown control, expected one of {known}")
         try:
@@ -343,21 +415,37 @@ class Controls:
             self._check(made)
         except ValueError as error:
             message = str(error)
-            for path in texts:
+            for path in names.values():
                 whole, _, number = (setting := self.rows[path].setting).rpartition(".")
                 message = message.removeprefix(f"{whole if number.isdigit() else setting}: ")
             message = message.removeprefix("exposure: ").removeprefix("camera: ")
-            labels = ", ".join(self.rows[path].label for path in texts)
+            labels = ", ".join(self.rows[path].label for path in names.values())
             raise ValueError(f"{labels}: {message}") from None
         initial = self.values(self.initial)
         written = {**made.texts, **self.values(made)}
-        return State(
-            {path: written[path] for path in made.texts if written[path] != initial.get(path)},
-            made.study,
+        if made.second is not None:
+            second = self.values(made.second)
+            written |= {SECOND + path: text for path, text in second.items() if _of_camera(path)}
+        return replace(
+            made,
+            texts={
+                path: written[path]
+                for path in made.texts
+                if written[path] != initial.get(path.removeprefix(SECOND))
+            },
         )
 
     def state(self, texts: Texts) -> State:
         """Return the state at given values; the initial ones where none is given."""
+        study = self._study({path: text for path, text in texts.items() if SECOND not in path})
+        if study.images != CAMERAS:
+            return State(texts, study)
+        common = {path: text for path, text in texts.items() if not _of_camera(path)}
+        own = {path.removeprefix(SECOND): text for path, text in common.items() if SECOND in path}
+        of_second = {path: text for path, text in common.items() if SECOND not in path} | own
+        return State(texts, study, State(of_second, self._study(of_second)))
+
+    def _study(self, texts: Texts) -> ShownStudy:
         study, words = self.study, dict[str, object]()
         for row in self.rows.values():
             if row.options:
@@ -371,7 +459,7 @@ class Controls:
             for path, row in self.rows.items()
             if path in texts and not row.options and _has(study, row.setting)
         }
-        return State(texts, changed(study, numbers))
+        return changed(study, numbers)
 
     def _check(self, state: State) -> None:
         """Raise a ValueError unless the camera can see the scene, and places are in the image."""
@@ -387,11 +475,22 @@ class Controls:
             camera = state.study.camera.on(self.raster, state.study.seed)
             duration = camera.frame_duration(self.raster)
             frame_weights(self.scene.times, self.scene.frame_spacing, state.study.start, duration)
+        if state.second is not None:
+            self._check(state.second)
 
 
 def shown_study(study: Study, **shown: Any) -> ShownStudy:
     """Return a study with settings of the page, such as the start of the exposure."""
     return ShownStudy(**{name: getattr(study, name) for name in study.given}, **shown)
+
+
+def _of_camera(path: str) -> bool:
+    """Return whether a control is one of a camera: not of its surroundings."""
+    return path == "set_emissivity" or (path.startswith("camera.") and path != "camera.reflected")
+
+
+def _edits_second(state: State) -> bool:
+    return state.study.images == CAMERAS and state.study.edited == "second"
 
 
 def _word(row: Control, texts: Texts) -> str:
@@ -412,17 +511,39 @@ def _has(study: Study, path: str) -> bool:
     return False
 
 
-def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
-    """Return the words of the controls that have some, the study's own one first."""
-    camera, psf = study.camera, study.camera.psf
-    limit = {"camera.lower_limit": camera.build().lower_limit}
-    psfs = {
+def _declared(
+    table: Iterable[Control],
+    study: Study,
+    options: Mapping[str, Mapping[str, Option]],
+    ranges: Mapping[str, dict[str, Any]],
+) -> dict[str, Control]:
+    """Return the controls whose setting the study has, or has with one of the options."""
+    words = (word for row in options.values() for word in row.values())
+    studies = [study, *(changed(study, word.changes) for word in words)]
+    rows = {}
+    for row in table:
+        declared = [setting_at(one, row.path) for one in studies if _has(one, row.path)]
+        if declared:
+            own, of_row = ranges.get(row.path, {}), options.get(row.path, {})
+            quantity = declared[0].parameter.quantity
+            rows[row.path] = replace(row, quantity=quantity, options=of_row, **own)
+    return rows
+
+
+def _psfs(none: str) -> dict[str, Option]:
+    return {
         "annular-aperture": Option(
             "Annular aperture", {"camera.psf": {"kind": "annular-aperture"}}
         ),
         "gaussian": Option("Gaussian", {"camera.psf": {"kind": "gaussian", "fwhm": "8 um"}}),
-        "none": Option("None (ideal)", {"camera.psf": "none", "camera.blur": ()}),
+        "none": Option(none, {"camera.psf": "none", "camera.blur": ()}),
     }
+
+
+def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
+    """Return the words of the controls that have some, the study's own one first."""
+    camera, psf = study.camera, study.camera.psf
+    limit = {"camera.lower_limit": camera.build().lower_limit}
     detectors = {
         "none": Option("None", {"camera.detector": "none", **limit}),
         "noise": Option("Noise", {"camera.detector": _NOISE, **limit}),
@@ -434,12 +555,12 @@ def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
         "scene_image": scene_images,
         "error_image": ERROR_IMAGES,
         "images": SHOWN_IMAGES,
-        "correction_image": CORRECTION_IMAGES,
+        "edited": EDITED,
         "analysis.reference": REFERENCES,
         "camera.psf_order": {"detector": "Blur on the pixels", "optics": "Blur on the scene"},
     }
     options = {
-        "camera.psf": _first("none" if psf is None else psf.kind, psfs),
+        "camera.psf": _first("none" if psf is None else psf.kind, _psfs("None (ideal)")),
         "camera.detector": _first(AS_STUDY if camera.detector else "none", detectors),
         "surface": _surfaces(study),
     }

@@ -36,8 +36,10 @@ TITLES: Final = {
     "scene": "Scene: true temperature / °C",
     "measured": "Measured radiance temperature / °C",
     "error": "Error / K",
+    "second": "Second camera / °C",
     "corrected": "Corrected temperature / °C",
-    "half_width": f"{CORRECTION_IMAGES['half-width']} / K",
+    "half_width": f"{CORRECTION_IMAGES['half_width']} / K",
+    "true": "True temperature / °C",
 }
 
 TEXT: Final = {"light": "#16191d", "dark": "#e8eaed"}
@@ -51,7 +53,7 @@ _MEASURED: Final = "#2b7fd0"
 _REFERENCE: Final = "#7d858f"
 _CORRECTED: Final = "#c2571a"
 
-_BORDER: Final = 46
+_BORDER: Final = 54
 """Pixels on the left of a figure for its labels, the same for all, so that they are aligned."""
 
 _LINE_HEIGHT: Final = 150
@@ -72,7 +74,7 @@ class Image:
         self.mapper = LinearColorMapper(
             palette=PALETTES[HEAT], low=0.0, high=1.0, nan_color=(0, 0, 0, 0.0)
         )
-        self._shown = np.zeros(0)
+        self._shown, self._colours = np.zeros(0), HEAT
         glyph = one.image(
             **{key: key for key in empty}, source=self.source, color_mapper=self.mapper
         )
@@ -95,7 +97,11 @@ class Image:
         """Show an image; Bokeh has its rows from the bottom."""
         self.figure.title.text = f"{panel.name} / {panel.unit}" if panel.unit else panel.name
         low, high = panel.limits
-        self.mapper.update(low=low, high=high, palette=PALETTES[panel.colours])
+        self.mapper.update(low=low, high=high)
+        # Bokeh checks each of 256 colours, which takes longer than all else.
+        if self._colours != panel.colours:
+            self._colours = panel.colours
+            self.mapper.palette = PALETTES[panel.colours]
         if self._shown is panel.values:
             return
         self._shown = panel.values
@@ -172,11 +178,14 @@ class Line:
             self.band.data = {"along": [], "low": [], "high": []}
 
     def show_corrected(self, curves: Mapping[str, Array]) -> None:
-        """Show or hide the corrected temperature, and shade its interval."""
-        is_known = "corrected" in curves
-        self.corrected.visible = self.corrected_item.visible = is_known
+        """Show or hide a third curve: the corrected temperature with its interval, or a camera."""
+        is_shown, is_known = "corrected" in curves, "low" in curves
+        self.corrected.visible = self.corrected_item.visible = is_shown
+        label = "corrected" if is_known else "second camera"
+        self.corrected_item.label = {"value": label}
         if self.reference_item is not None:
             self.reference_item.label = {"value": "true" if is_known else "reference"}
+            self.reference_item.visible = is_known or not is_shown
         self.shade.glyph.fill_color = _CORRECTED if is_known else _MEASURED
         if is_known:
             inside = np.isfinite(curves["low"]) & np.isfinite(curves["high"])

@@ -1,9 +1,10 @@
-"""Inputs of the app: a scene, a folder of results, a measurement, or the bundled scene."""
+"""Inputs of the app: scenes, results, measurements, and files of cameras and other programs."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from secrets import token_urlsafe
+from shutil import rmtree
 from tempfile import TemporaryDirectory
 from typing import Any, Final, TypeAlias
 
@@ -12,12 +13,40 @@ import numpy as np
 from chipglow.analysis import spread_starts
 from chipglow.analysis.cut import lacking, middle_start
 from chipglow.analysis.places import LINE_REACH, TOUCHING
-from chipglow.app.controls import CORRECTION, CURSOR, LINES, Controls, rounded, shown_study
-from chipglow.app.pictures import CorrectionModel, MeasurementModel, Model, SceneModel, with_samples
-from chipglow.camera import Measurement
+from chipglow.app.asking import (
+    Content,
+    MissingSettingsError,
+    camera_frames,
+    contents_of,
+    described,
+    description_text,
+    imported,
+    save_description,
+)
+from chipglow.app.controls import CURSOR, LINES, Controls, rounded, shown_study
+from chipglow.app.pictures import (
+    CorrectionModel,
+    MeasuredFrames,
+    MeasurementModel,
+    Model,
+    SceneModel,
+    with_samples,
+)
 from chipglow.chip import Instant, Segment
 from chipglow.correction import Correction, is_correction, read_correction
-from chipglow.io import StoredScene, example_scene, is_measurement, open_scene, read_measurement
+from chipglow.io import (
+    StoredScene,
+    example_scene,
+    is_measurement,
+    is_scene,
+    open_measurement,
+    open_scene,
+)
+from chipglow.io.cameras.formats import load_libraries
+from chipglow.io.measurement_file import holds
+from chipglow.io.sandbox import ReaderProcess, Sandbox
+from chipglow.laboratory.emissivity import PlacesDescription, is_places, load_places
+from chipglow.laboratory.recordings import StoredFrames
 from chipglow.quantities import Array, unchecked
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study
@@ -33,9 +62,7 @@ MOST_UPLOADED: Final = 512 * 1024**2
 _MOST_OPEN: Final = 8
 """Uploaded files that stay open; older ones are closed."""
 
-SHOWN: Final = (
-    "start", "images", "scene_image", "error_image", "correction_image", "emissivity_uncertainty",
-)  # fmt: skip
+SHOWN: Final = ("start", "images", "scene_image", "error_image", "emissivity_uncertainty")
 """Settings of the page that a study does not have."""
 
 SHOWN_LINE: Final = "# Shown in chipglow app: "
@@ -70,22 +97,21 @@ def scene_model(
     return SceneModel(name, scene, None if coarse is scene else coarse, controls, file)
 
 
-def measurement_model(measurement: Measurement, name: str) -> MeasurementModel:
+def measurement_model(
+    measured: MeasuredFrames, name: str, description: str = ""
+) -> MeasurementModel:
     """Open a measurement with cursor and lines through the hottest pixel of its first frame."""
-    first = np.asarray(measurement.data["radiance_temperature"][0].values, np.float64)
-    usable = np.where(measurement.usable[0], first, np.nan)
-    study = _at_the_hottest(Study(), usable, measurement.raster)
-    controls = Controls.of_measurement(study, measurement.times, measurement.raster)
-    return MeasurementModel(name, measurement, controls)
+    first = measured.first
+    study = _at_the_hottest(Study(), first.radiance_temperature()[0], first.raster)
+    controls = Controls.of_measurement(study, measured.times, first.raster)
+    return MeasurementModel(name, measured, controls, description)
 
 
 def correction_model(correction: Correction, name: str) -> CorrectionModel:
     """Open a correction with cursor and lines through the hottest pixel of its first frame."""
     data, raster = correction.data, correction.raster
-    study = _at_the_hottest(
-        shown_study(Study(), images=CORRECTION), data["temperature"][0].values, raster
-    )
-    controls = Controls.of_measurement(study, data["time"].values, raster)
+    study = _at_the_hottest(Study(), data["temperature"][0].values, raster)
+    controls = Controls.of_frames(study, data["time"].values, raster)
     return CorrectionModel(name, correction, controls)
 
 
@@ -97,22 +123,112 @@ def _at_the_hottest(study: Study, kelvins: Array, raster: Raster) -> Study:
     return _with_places(study, raster, *_through(raster, (raster.x[column], raster.y[row])))
 
 
-def open_any(path: Scene | str | Path | None, study: Study | None = None) -> Model:
-    """Open a scene, a measurement, a correction or results; without a path the bundled scene."""
+@dataclass(frozen=True)
+class Asking:
+    """A file of a camera or of another program, whose settings a page asks for.
+
+    `error` states what is missing in `settings`; empty before they were tried.
+    """
+
+    path: Path
+    name: str
+    contents: tuple[Content, ...]
+    error: str = ""
+    settings: Mapping[str, str] = field(default_factory=dict)
+    source: str = ""
+    places: PlacesDescription | None = None
+    """See the models."""
+
+    def answered(
+        self,
+        content: Content,
+        settings: Mapping[str, str],
+        folder: Path,
+        process: ReaderProcess | None = None,
+    ) -> "Model | Asking":
+        """Open the file with settings, which are then saved beside it; else ask again.
+
+        Scenes are imported into `folder`.
+        """
+        source = described(self.path)
+        try:
+            if content == "measurement":
+                frames, known = camera_frames(source, settings, process)
+                opened: Model = measurement_model(
+                    frames, self.name, description_text(self.path, known)
+                )
+            else:
+                file, known = imported(source, settings, folder)
+                opened = open_scene_object(open_scene(file), None, self.name)
+        except MissingSettingsError as error:
+            return replace(self, error=self._by_name(str(error)), settings=settings)
+        if settings:
+            save_description(self.path, known)
+        return replace(opened, source=self.source, places=self.places)
+
+    def _by_name(self, message: str) -> str:
+        return message.replace(str(self.path), self.name).replace(self.path.name, self.name)
+
+
+def open_any(path: Scene | str | Path | None, study: Study | None = None) -> Model | Asking:
+    """Open what the app shows; without a path the bundled scene.
+
+    A scene, a measurement, a correction, a study or results are opened. A file of a camera or of
+    another program may lack settings.
+    """
     if path is None:
         return open_scene_object(example_scene(), study, "bundled scene")
     if isinstance(path, Scene):
         return open_scene_object(path, study, "scene")
     path = Path(path)
-    if path.is_dir():
+    if _is_yaml(path.name) and is_places(read_yaml(path)):
+        return _session(path)
+    return replace(_opened(path, study), source=str(path.resolve()))
+
+
+def _session(path: Path) -> Model | Asking:
+    """Open the file that a session names, with its places and view."""
+    places = load_places(path)
+    if places.file is None:
+        raise ValueError(f"{path}: file: is missing; state the measurement or camera file to open")
+    file = path.parent / places.file
+    if not file.exists():
+        raise FileNotFoundError(f"{path}: file: {file}: there is no such file")
+    if _is_yaml(file.name) and is_places(read_yaml(file)):
+        raise ValueError(f"{path}: file: {file} is a session too, expected a measurement")
+    return replace(open_any(file), places=places)
+
+
+def _opened(path: Path, study: Study | None) -> Model | Asking:
+    """Open a file or folder by its content."""
+    if path.is_dir() and path.suffix.lower() != ".zarr":
         return _results(path)
-    if _is_study(path.name):
-        return _study(path, path.name)
+    if _is_yaml(path.name):
+        return _described(path) or _study(path, path.name)
     if is_correction(path):
         return correction_model(read_correction(path), path.name)
     if is_measurement(path):
-        return measurement_model(read_measurement(path), path.name)
-    return open_scene_object(open_scene(path), study, path.name)
+        return measurement_model(StoredFrames(open_measurement(path)), path.name)
+    contents = () if is_scene(path) else contents_of(path)
+    if contents and not holds(path, ()):
+        return Asking(path, path.name, contents)
+    try:
+        return open_scene_object(open_scene(path), study, path.name)
+    except ValueError:
+        if not contents:
+            raise
+        return Asking(path, path.name, contents)
+
+
+def _described(path: Path) -> Model | Asking | None:
+    """Open the file that a description names; None if the file describes something else."""
+    data = read_yaml(path)
+    if not isinstance(data, dict):
+        return None
+    if "file" in data:
+        frames, _ = camera_frames(path, {})
+        return measurement_model(frames, path.name, path.read_text(encoding="utf-8"))
+    return Asking(path, path.name, ("scene",)) if "source" in data else None
 
 
 def open_scene_object(scene: Scene, study: Study | None, name: str) -> SceneModel:
@@ -122,48 +238,83 @@ def open_scene_object(scene: Scene, study: Study | None, name: str) -> SceneMode
 
 
 class OpenFiles:
-    """The command's input and the uploads; the key of an upload is its name."""
+    """The command's input and the uploads, by keys; the input's key is empty."""
 
-    def __init__(self, first: Model) -> None:
+    def __init__(self, first: Model | Asking) -> None:
         self._folder = TemporaryDirectory(prefix="chipglow-app-")
         self.folder = Path(self._folder.name)
-        self._opened = {"": first}
+        self.process = ReaderProcess()
+        self._opened = {"": self._tried(first)}
 
-    def find(self, key: str) -> Model | None:
-        """Return an upload by its key, the first file without one; None if it is not open."""
+    def warm(self) -> None:
+        """Prepare to open a file, so that the first one takes no longer than others."""
+        with self.process.used():
+            Sandbox("reader").answer(load_libraries)
+        band = Study().camera.build().band
+        band.temperature(band.radiance(np.full((2, 2), 600.0)))  # K: loads compiled kernels
+
+    def find(self, key: str) -> Model | Asking | None:
+        """Return an open file by its key; None if it is not open."""
         return self._opened.get(key)
 
-    def new_path(self) -> Path:
-        """Return a path for an upload, which nobody can guess."""
-        return self.folder / f"{token_urlsafe(12)}.nc"
-
-    def add(self, path: Path, name: str) -> str:
+    def add(self, name: str, content: bytes) -> str:
         """Open an uploaded file and return its key; the oldest of too many is removed."""
-        self._opened[path.stem] = open_uploaded(path, name, self._opened.values())
+        key = token_urlsafe(12)  # bytes: nobody can guess it
+        name = Path(name).name
+        path = self.folder / key / name
+        path.parent.mkdir()
+        try:
+            path.write_bytes(content)
+            self._opened[key] = self._tried(open_uploaded(path, name, self._opened.values()))
+        except (ValueError, OSError):
+            rmtree(path.parent)
+            raise
         for old in list(self._opened)[1:-_MOST_OPEN]:
             del self._opened[old]
-            (self.folder / f"{old}.nc").unlink(missing_ok=True)
-        return path.stem
+            rmtree(self.folder / old)
+        return key
+
+    def answer(self, key: str, content: Content, settings: Mapping[str, str]) -> Model | Asking:
+        """Open a file with settings; it is still asking if they do not suffice."""
+        asking = self._opened[key]
+        assert isinstance(asking, Asking)
+        self._opened[key] = self._answered(asking, content, settings)
+        return self._opened[key]
 
     def close(self) -> None:
+        self.process.close()
         self._folder.cleanup()
 
+    def _tried(self, opened: Model | Asking) -> Model | Asking:
+        """Open a file without settings, or by its description, if its content is clear."""
+        if isinstance(opened, Asking) and len(opened.contents) == 1:
+            return self._answered(opened, opened.contents[0], {})
+        return opened
 
-def open_uploaded(path: Path, name: str, others: Iterable[Model] = ()) -> Model:
+    def _answered(
+        self, asking: Asking, content: Content, settings: Mapping[str, str]
+    ) -> Model | Asking:
+        folder = self.folder / f"scene-{token_urlsafe(6)}"
+        folder.mkdir()
+        return asking.answered(content, settings, folder, self.process)
+
+
+def open_uploaded(path: Path, name: str, others: Iterable[Model | Asking] = ()) -> Model | Asking:
     """Open an uploaded file by the name that its owner gave it.
 
     An uploaded study shows the scene of its name among the `others` that are open, or its cut.
     """
     try:
-        if _is_study(name):
-            return _study_of_open_scene(path, name, others)
+        if _is_yaml(name):
+            others = list(others)
+            return _session_of_open_file(path, others) or _study_of_open_scene(path, name, others)
         opened = open_any(path)
     except (ValueError, OSError) as error:
         message = str(error).replace(str(path), name).replace(path.name, name)
         raise ValueError(message) from None
     if isinstance(opened, SceneModel):
-        return replace(opened, name=name, file=name)
-    return replace(opened, name=name)
+        return replace(opened, name=name, file=name, source=name)
+    return replace(opened, name=name, source=name)
 
 
 def _results(folder: Path) -> SceneModel:
@@ -173,7 +324,7 @@ def _results(folder: Path) -> SceneModel:
     return _study(file, folder.name)
 
 
-def _is_study(name: str) -> bool:
+def _is_yaml(name: str) -> bool:
     return name.lower().endswith((".yaml", ".yml"))
 
 
@@ -198,7 +349,19 @@ def _shown_of(path: Path) -> dict[str, Any]:
     return {}
 
 
-def _study_of_open_scene(path: Path, name: str, others: Iterable[Model]) -> SceneModel:
+def _session_of_open_file(path: Path, others: Iterable[Model | Asking]) -> Model | None:
+    """Return the open file that a session names, with its places; None for another file."""
+    if not is_places(read_yaml(path)):
+        return None
+    places = load_places(path)
+    named = Path(places.file or "").name
+    for other in others:
+        if not isinstance(other, Asking) and named == Path(other.source).name:
+            return replace(other, places=places)
+    raise ValueError(f"{path}: its file {named or 'is not stated'}: open that file first")
+
+
+def _study_of_open_scene(path: Path, name: str, others: Iterable[Model | Asking]) -> SceneModel:
     data = read_yaml(path)
     named = data.get("scene") if isinstance(data, dict) else None
     if named is None:

@@ -1,11 +1,10 @@
 // The page of the app around its figures. Its content comes from Python in messages of a kind and a
 // content; what the user does goes back in messages.
 
-const BORDER = 46, GAP = 18, LEAST_FRAME = 180;
+const BORDER = 54, GAP = 18, LEAST_FRAME = 180;
 const NARROW = 888, LEAST_PAIR = 560; // widths in pixels of the part beside the controls
-const VIEW_WIDTH = 160; // µm
+const MOST_ACROSS = 3; // images in a row
 const GRIP = 12; // pixels
-const PIECE = 2 ** 22; // bytes of a file in one message
 
 export function render({ view, model, el }) {
   const page = document.createElement("div");
@@ -20,6 +19,10 @@ export function render({ view, model, el }) {
   const plotOf = (name) => Bokeh.index.find_one_by_id(named(`${name}_figure`).id);
   const figures = model.get_child("figures");
   spec.figures.forEach((name, i) => find(`#figure-${name}`).prepend(figures[i]));
+  const dropper = model.get_child("dropper");
+  if (dropper) find(".dropper").append(dropper);
+  find(".hint").before(model.get_child("tools"));
+  find(".panels").append(...model.get_child("panels"));
   el.style.width = "100%";
   el.append(page);
 
@@ -109,6 +112,8 @@ export function render({ view, model, el }) {
     const cell = down.target.closest?.(".figure");
     if (!cell || down.button !== 0) return;
     const plot = plotOf(cell.id.replace("figure-", "")), figure = plot.model;
+    // A tool that draws or edits, once chosen, has the pointer for itself.
+    if (figure.toolbar.tools.some((one) => one.active && /Draw|Edit|Select/.test(one.type))) return;
     const box = plot.canvas_view.el.getBoundingClientRect();
     const { x_scale, y_scale, bbox } = plot.frame;
     const at = (event) => [x_scale.invert(event.clientX - box.x), y_scale.invert(event.clientY - box.y)];
@@ -164,7 +169,7 @@ export function render({ view, model, el }) {
     if (dataset.view !== "whole") {
       const places = points(dataset.view);
       const [x, y] = [0, 1].map((axis) => places.reduce((sum, one) => sum + one[axis] / places.length, 0));
-      const [half, tall] = [VIEW_WIDTH / 2, VIEW_WIDTH / 2 * spec.shape];
+      const [half, tall] = [spec.view / 2, spec.view / 2 * spec.shape];
       [left, right, bottom, top] = [x - half, x + half, y - tall, y + tall];
     }
     const { x_range, y_range } = named("measured_figure");
@@ -210,10 +215,8 @@ export function render({ view, model, el }) {
     const bar = find("#progress"), draws = typeof progress === "number";
     bar.hidden = progress === undefined;
     draws ? (bar.value = progress) : bar.removeAttribute("value");
-    if (find("#draw")) {
-      find("#cancel").hidden = !draws;
-      find("#draw").disabled = draws;
-    }
+    find("#cancel").hidden = !draws;
+    if (find("#draw")) find("#draw").disabled = draws;
     for (const path of invalid ?? []) controls.get(path)?.field.setAttribute("aria-invalid", "true");
   }
 
@@ -249,7 +252,7 @@ export function render({ view, model, el }) {
   each("#sheet", "click", () => {
     if (quick) return showStatus({ text: "The exact picture is not ready; save again when it is shown.", kind: "error" });
     const lines = spec.figures.filter((one) => !spec.images.includes(one));
-    const rows = [spec.images, lines].map((row) => row.map((one) => plotOf(one).export("png").canvas));
+    const rows = [shown, lines].map((row) => row.map((one) => plotOf(one).export("png").canvas));
     const sum = (row) => row.reduce((width, one) => width + one.width, 0);
     const tall = rows.map((row) => Math.max(...row.map((one) => one.height)));
     const sheet = document.createElement("canvas"), context = sheet.getContext("2d");
@@ -272,6 +275,7 @@ export function render({ view, model, el }) {
   // lines, and the next picture.
   function showPicture({ number, lines, absent, ...picture }) {
     quick = picture.quick;
+    showImages(picture.images);
     find(".numbers").classList.add("old"); // until those of this picture come
     for (const option of controls.get("error_image")?.field.options ?? []) {
       const reason = absent[option.value];
@@ -286,22 +290,21 @@ export function render({ view, model, el }) {
     }, 0));
   }
 
-  // Files, links, theme and size.
-
-  // A file is sent in pieces, the next one when Python has the one before.
-  let sendMore = null;
-  each("#open", "click", () => find("#file").click());
-  each("#file", "change", ({ files }) => files.length && upload(files[0]));
-  async function upload(file, begin = 0) {
-    const refuse = (text) => showStatus({ text: `${file.name}: ${text}`, kind: "error" });
-    if (file.size > spec.most_uploaded) return refuse(`refused, a file may have up to ${spec.most_uploaded / 2 ** 20} MiB`);
-    showStatus({ text: `Checking ${file.name}`, kind: "busy", progress: null });
-    const end = begin + PIECE;
-    const data = await file.slice(begin, end).arrayBuffer().catch(() => null);
-    if (data === null) return refuse("cannot be read");
-    sendMore = () => upload(file, end);
-    send("piece", { name: file.name, data, first: begin === 0, last: end >= file.size });
+  // The images of a mode; the others are hidden.
+  let shown = spec.shown;
+  function hideOthers() {
+    for (const name of spec.images) find(`#figure-${name}`).hidden = !shown.includes(name);
   }
+  function showImages(images) {
+    if (String(images) === String(shown)) return;
+    shown = images;
+    hideOthers();
+    size = "";
+    refit();
+  }
+  hideOthers();
+
+  // Files, links, theme and size.
 
   each("#link", "click", async () => {
     const text = location.href;
@@ -334,7 +337,7 @@ export function render({ view, model, el }) {
     const height = Math.round(spec.embedded ? 900 : innerHeight);
     if (width < 1 || size === `${width}x${height}`) return false;
     size = `${width}x${height}`;
-    const count = width < LEAST_PAIR ? 1 : Math.max(spec.images.length, 2);
+    const count = width < LEAST_PAIR ? 1 : Math.min(Math.max(shown.length, 2), MOST_ACROSS);
     const wide = (width - BORDER - (count - 1) * GAP) / count - (count === 1 ? 26 : 12);
     const tallest = Math.max(0.52 * height - 60, LEAST_FRAME);
     const frame = Math.trunc(Math.max(Math.min(wide, tallest / spec.shape), LEAST_FRAME));
@@ -372,7 +375,7 @@ export function render({ view, model, el }) {
     });
   }
   const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture,
-    chip: (url) => { find(".chip img").src = url; }, more: () => sendMore(), open: (key) => { location.search = `?open=${key}`; } };
+    chip: (url) => { find(".chip img").src = url; }, open: (key) => { location.search = `?open=${key}`; } };
   model.on("msg:custom", ({ kind, content }) => shows[kind](content));
   find(".images").addEventListener("pointerdown", grip);
   const watcher = new ResizeObserver(refit);

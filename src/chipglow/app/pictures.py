@@ -4,8 +4,9 @@ from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from math import ceil, nan, sqrt
-from typing import Any, ClassVar, Final, TypeAlias, TypeVar, cast, get_args
+from typing import Any, ClassVar, Final, Protocol, TypeAlias, TypeVar, cast, get_args
 
 import numpy as np
 import xarray as xr
@@ -17,6 +18,8 @@ from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.images import errors_of, exposed_chain, parts_of
 from chipglow.analysis.read import Schedule, SurfacePlaces, read
 from chipglow.app.controls import (
+    CAMERAS,
+    CORRECTING,
     CORRECTION,
     CORRECTION_IMAGES,
     CURSOR,
@@ -24,21 +27,33 @@ from chipglow.app.controls import (
     LINES,
     REFERENCES,
     SCENE_IMAGES,
+    WHOLE,
     Controls,
+    ShownStudy,
     State,
 )
 from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.camera.chain import ExposedChain
 from chipglow.camera.exposure_kernels import Check
 from chipglow.camera.reference import TRUE
-from chipglow.correction import Correction, correct, observed_scene, scene_truth, surroundings_of
+from chipglow.correction import (
+    Correction,
+    Zone,
+    correct,
+    observed_scene,
+    scene_truth,
+    surroundings_of,
+)
 from chipglow.drawing.scales import HEAT, PLAIN, SIGNED, ends, round_limit
 from chipglow.io import StoredScene
+from chipglow.laboratory.emissivity import PlacesDescription
 from chipglow.quantities import ZERO_CELSIUS, Array, Brief
+from chipglow.radiometry import ObjectParameters
 from chipglow.scene import Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 from chipglow.study import fit
 from chipglow.surface import Surface
+from chipglow.text import Notes
 
 _Exposed: TypeAlias = tuple[ExposedChain, ExposedChain | None]
 _Result = TypeVar("_Result")
@@ -123,19 +138,18 @@ class Corrected(Brief):
         """The frame of the correction."""
         return self.correction.data.isel(time=self.frame)
 
-    def image(self, name: str) -> Array:
-        """Return one of `CORRECTION_IMAGES`, or the corrected temperature, in K."""
-        if name == "half-width":
-            return self.correction.half_width(self.frame)
-        temperature = np.asarray(self.data["temperature"].values, np.float64)
-        if name == "corrected":
-            return temperature
-        assert self.true is not None
-        return (
-            temperature - self.true
-            if name == "error"
-            else np.where(np.isnan(temperature), nan, self.true)
-        )
+    @cached_property
+    def images(self) -> Mapping[str, Array]:
+        """The images of `CORRECTION_IMAGES` that are known: temperatures in °C, others in K."""
+        kelvins = np.asarray(self.data["temperature"].values, np.float64)
+        images = {
+            "corrected": kelvins - ZERO_CELSIUS,
+            "half_width": self.correction.half_width(self.frame),
+        }
+        if self.true is not None:
+            images["true"] = np.where(np.isnan(kelvins), nan, self.true) - ZERO_CELSIUS
+            images["error"] = kelvins - self.true
+        return images
 
     def at(self, place: tuple[float, float]) -> CorrectedPixel | None:
         """Return the pixel at x and y in m; None without a corrected temperature."""
@@ -172,6 +186,7 @@ class Picture(Brief):
     absent: Mapping[str, str] = field(default_factory=dict)  # why error images are 0 everywhere
     reference: str = ""  # label of the reference
     corrected: Corrected | None = None
+    second: Panel | None = None  # image of the second camera
 
     @property
     def lower_limit(self) -> float | None:
@@ -189,6 +204,32 @@ class Drawn(Brief):
     error: Distribution | None
 
 
+@dataclass(frozen=True, eq=False)
+class SceneFrames:
+    """Frames that the camera of a state makes of a scene, computed when they are asked for."""
+
+    state: State
+    scene: Scene
+    times: Array
+
+    @property
+    def raster(self) -> Raster:
+        """Grid of the pixels."""
+        return self._camera.pixels(self.scene.raster)
+
+    def kelvins(self, index: int) -> Array:
+        """Return the radiance temperature of a frame in K, shape (y, x); NaN out of range."""
+        fitted = fit(self.state.study, self.scene)
+        (surface,) = fitted.surfaces.values()
+        measured = self._camera.measure(fitted.scene, surface, float(self.times[index]))
+        return np.asarray(measured.radiance_temperature()[0])
+
+    @property
+    def _camera(self) -> Camera:
+        study = self.state.study
+        return study.camera.on(self.scene.raster, study.seed)
+
+
 @dataclass(eq=False)
 class SceneModel:
     """A scene, the controls of its study, and pictures; each session has a copy."""
@@ -198,7 +239,14 @@ class SceneModel:
     coarse: Scene | None  # with fewer samples, for a quick look before the exact picture
     controls: Controls
     file: str | None  # the scene as a saved study names it; None for the study's cut
-    images: ClassVar[tuple[str, ...]] = ("scene", "measured", "error")
+    source: str = ""
+    """The file as a session names it."""
+    places: PlacesDescription | None = None
+    """Places and view of the session that was opened."""
+    images: ClassVar[tuple[str, ...]] = (
+        "scene", "measured", "second", "corrected", "half_width", "true", "error",
+    )  # fmt: skip
+    notes: ClassVar[Notes] = Notes()
     _caches: dict[str, dict[Hashable, Any]] = field(
         init=False, default_factory=lambda: defaultdict(dict), repr=False
     )
@@ -211,10 +259,19 @@ class SceneModel:
     def tool(self) -> Tool | None:
         return self.scene.tool
 
+    def shown(self, state: State) -> tuple[str, ...]:
+        """Return the names of the images at a state."""
+        if state.study.images == CORRECTION:
+            return ("measured", *CORRECTION_IMAGES)
+        third = "second" if state.study.images == CAMERAS else "error"
+        return ("scene", "measured", third)
+
     def is_ready(self, state: State) -> bool:
         """Return whether the exact picture needs no quick look, as it takes milliseconds."""
         if self.coarse is None:
             return True
+        if state.second is not None and not self.is_ready(state.second):
+            return False
         key, camera = self._exposure_key(state), state.study.camera
         kind = camera.psf.kind if camera.psf else ""
         on_samples = camera.psf_order != "detector" and kind == "annular-aperture"
@@ -261,13 +318,22 @@ class SceneModel:
             _crossings(state, scene.tool), quick, camera, exposure, parts, _absent(state, surface),
             reference,
         )  # fmt: skip
+        if state.second is not None:
+            return _with_second(picture, self.picture(state.second, quick, check))
         if state.study.images != CORRECTION:
             return picture
         known = self._caches["correction"].get(self._correction_key(state))
-        return _with_correction(picture, known, self.images)
+        return _with_correction(picture, known, tuple(CORRECTION_IMAGES))
 
-    def corrected(self, picture: Picture, check: Check) -> Picture:
-        """Return an exact picture with its corrected image around the cursor."""
+    def needs(self, state: State) -> str:
+        """Return what a correction still needs: nothing, as the scene states it."""
+        return ""
+
+    def corrected(self, picture: Picture, check: Callable[[float], None]) -> Picture:
+        """Return an exact picture with its corrected image around the cursor.
+
+        `check` takes the completed fraction.
+        """
         assert picture.camera and picture.exposure
         state, camera, exposure = picture.state, picture.camera, picture.exposure
 
@@ -275,15 +341,15 @@ class SceneModel:
             scene, surface = self._on(state, quick=False)
             start, known = exposure.start, state.study.emissivity_uncertainty
             observed = observed_scene(scene, camera, surface, start, known)
-            check()
+            check(0.0)
             data = camera.form_measurement(exposure).data
-            rows, columns = _around_cursor(state, picture.raster)
+            rows, columns = _around_cursor(state, picture.raster, _HALF)
             result = correct(
                 Measurement(data.isel(y=rows, x=columns)),
                 camera,
                 observed,
                 surroundings=surroundings_of(camera),
-                progress=lambda done: check(),
+                progress=check,
             )
             return Corrected(result, scene_truth(result, scene, camera, observed, start))
 
@@ -292,9 +358,23 @@ class SceneModel:
 
     def _correction_key(self, state: State) -> Hashable:
         camera = self._camera(state, self.scene)
-        rows, columns = _around_cursor(state, camera.pixels(self.scene.raster))
+        rows, columns = _around_cursor(state, camera.pixels(self.scene.raster), _HALF)
         window = rows.start, columns.start
         return self._exposure_key(state), camera, state.study.emissivity_uncertainty, window
+
+    def frames(self, state: State) -> SceneFrames:
+        """Return the frames of the state's camera, one for each start that the scene allows."""
+        starts = np.array(self.controls.ranges(state)["start"])
+        return SceneFrames(state, self.scene, 1e-6 * starts)
+
+    def frame(self, state: State) -> int:
+        """Return the index of the frame that begins nearest to the state's start."""
+        return _nearest_time(self.frames(state).times, state)
+
+    def measurement_of(self, picture: Picture) -> Measurement:
+        """Return what the camera measures in a picture's exposure."""
+        assert picture.camera and picture.exposure
+        return picture.camera.form_measurement(picture.exposure)
 
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the numbers at the cursor in K: those of the `error_parts`, and of the scene."""
@@ -315,6 +395,11 @@ class SceneModel:
         calibration = camera.calibration(raster.shape)
         if calibration and np.isfinite(numbers["measured"]):
             numbers["uncertainty"] = calibration.netd(numbers["measured"])
+        if picture.second is not None:
+            pixel = nearest(picture.second.values, picture.second.raster, at)
+            numbers["second"] = float(pixel) + ZERO_CELSIUS
+            shown = nearest(picture.panels["measured"].values, raster, at)
+            numbers["first"] = float(shown) + ZERO_CELSIUS
         numbers["sample temperature"] = sample_of("temperature") + ZERO_CELSIUS
         numbers["sample emissivity"] = sample_of("emissivity")
         return numbers
@@ -483,53 +568,124 @@ class _FramesModel(ABC):
 
     @property
     @abstractmethod
+    def images(self) -> tuple[str, ...]:
+        """Names of the images."""
+
+    def shown(self, state: State) -> tuple[str, ...]:
+        """Return the names of the images at a state: always all."""
+        return self.images
+
+    def needs(self, state: State) -> str:
+        """Return what a correction still needs, in words; empty if nothing."""
+        return ""
+
+    @property
+    @abstractmethod
     def times(self) -> Array:
         """Times of the frames in s."""
 
+    @property
+    @abstractmethod
+    def raster(self) -> Raster:
+        """Grid of the pixels."""
+
+    @abstractmethod
+    def kelvins(self, index: int) -> Array:
+        """Return the radiance temperature of a frame in K, shape (y, x); NaN out of range."""
+
+    def frames(self, state: State) -> "_FramesModel":
+        """Return the frames, which do not depend on the state."""
+        return self
+
     def frame(self, state: State) -> int:
-        """Return the frame that began nearest to the state's start."""
-        return int(np.abs(self.times - state.study.start).argmin())
+        """Return the index of the frame that began nearest to the state's start."""
+        return _nearest_time(self.times, state)
 
     def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
         """Return nothing: an error is not known without the truth."""
         return {}
 
 
+class MeasuredFrames(Protocol):
+    """Frames of a measurement, each read when it is asked for."""
+
+    first: Measurement
+    times: Array
+
+    @property
+    def notes(self) -> Notes:
+        """Assumptions and warnings."""
+
+    def measurement(self, index: int) -> Measurement:
+        """Return one frame."""
+
+
 @dataclass(eq=False)
 class MeasurementModel(_FramesModel):
-    """A measurement, its controls, and its frames as pictures."""
+    """Frames of a measurement, their controls, and pictures; each session has a copy."""
 
     name: str
-    measurement: Measurement
+    measured: MeasuredFrames
     controls: Controls
+    description: str = ""
+    """YAML of a camera file's settings."""
+    source: str = ""
+    """The file as a session names it."""
+    places: PlacesDescription | None = None
+    """Places and view of the session that was opened."""
+    _last: dict[int, tuple[xr.Dataset, dict[str, Panel], str]] = field(
+        init=False, default_factory=dict, repr=False
+    )
+    _corrected: dict[Hashable, Corrected] = field(init=False, default_factory=dict, repr=False)
 
     @property
     def times(self) -> Array:
-        return self.measurement.times
+        return self.measured.times
 
     @property
     def raster(self) -> Raster:
-        return self.measurement.raster
+        return self.measured.first.raster
 
     @property
     def tool(self) -> Tool | None:
-        return self.measurement.tool
+        return self.measured.first.tool
+
+    @property
+    def notes(self) -> Notes:
+        """Assumptions and warnings."""
+        return self.measured.notes
+
+    def kelvins(self, index: int) -> Array:
+        return np.asarray(self.measured.measurement(index).radiance_temperature()[0])
 
     @property
     def images(self) -> tuple[str, ...]:
         """Names of the images."""
-        return ("measured", "error") if REFERENCE in self.measurement.data else ("measured",)
+        error = ("error",) if REFERENCE in self.measured.first.data else ()
+        return ("measured", "corrected", "half_width", *error)
 
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
         """Return the frame that began nearest to the state's start."""
-        measurement = self.measurement
-        index, raster = self.frame(state), measurement.raster
-        reference, label = measurement.data.get(REFERENCE), ""
+        data, panels, label = self._shown(self.frame(state))
+        raster = self.raster
+        picture = Picture(
+            state, raster, data, panels, _lines(state, raster, data),
+            _crossings(state, self.tool), reference=label,
+        )  # fmt: skip
+        known = self._corrected.get(self._key(state))
+        return _with_correction(picture, known, ("corrected", "half_width"))
+
+    def _shown(self, index: int) -> tuple[xr.Dataset, dict[str, Panel], str]:
+        """Return data and images of a frame, the last one again, and the label of its reference."""
+        if index in self._last:
+            return self._last[index]
+        measurement = self.measured.measurement(index)
+        raster, reference = measurement.raster, measurement.data.get(REFERENCE)
         # The error is stated of pixels out of range too, as it is for a scene.
-        measured = measurement.radiance_temperature(flagged=reference is not None)[index]
-        images = {"measured": measured, "flagged": ~measurement.usable[index]}
+        measured = measurement.radiance_temperature(flagged=reference is not None)[0]
+        images, label = {"measured": measured, "flagged": ~measurement.usable[0]}, ""
         if reference is not None:
-            images["reference"] = reference[index].values
+            images["reference"] = reference[0].values
             images["case_1"] = measured - images["reference"]
             label = REFERENCES.get(str(reference.attrs.get("reference")), "reference")
         data = xr.Dataset({name: (("y", "x"), image) for name, image in images.items()})
@@ -537,18 +693,76 @@ class MeasurementModel(_FramesModel):
         if reference is not None:
             values = _unflagged(data, data["case_1"])
             panels["error"] = _error_panel(_error_title(label), values, raster)
-        lines, crossings = _lines(state, raster, data), _crossings(state, measurement.tool)
-        return Picture(state, raster, data, panels, lines, crossings, reference=label)
+        self._last = {index: (data, panels, label)}
+        return self._last[index]
+
+    def needs(self, state: State) -> str:
+        """Return what a correction still needs, in words; empty if nothing."""
+        study, band = state.study, "band_lower" in self.measured.first.data.attrs
+        missing = {
+            "the emissivity": study.emissivity is None,
+            "the point spread function (PSF)": study.camera.psf is None,
+            "the camera's band": not band,
+        }
+        return " and ".join(name for name, is_missing in missing.items() if is_missing)
+
+    def corrected(self, picture: Picture, check: Callable[[float], None]) -> Picture:
+        """Return a picture with the corrected image; `check` takes the completed fraction."""
+        state = picture.state
+        study, measurement = state.study, self.measured.measurement(self.frame(state))
+        rows, columns = self._part(state)
+        camera = self._camera(study, measurement)
+        whole = Zone("image", study.emissivity, None, study.emissivity_uncertainty)
+        result = correct(
+            Measurement(measurement.data.isel(y=rows, x=columns)),
+            camera,
+            [whole],
+            surroundings=surroundings_of(camera),
+            progress=check,
+        )
+        self._corrected[self._key(state)] = Corrected(result)
+        while len(self._corrected) > _KEPT["correction"]:
+            del self._corrected[next(iter(self._corrected))]
+        return self.picture(state)
+
+    def _camera(self, study: ShownStudy, measurement: Measurement) -> Camera:
+        """Return the camera of the measurement, with the optics of the page."""
+        stated = study.camera
+        return Camera(
+            band=measurement.band,
+            pitch=measurement.raster.spacing,
+            fill_factor=float(measurement.data.attrs.get("fill_factor", 1.0)),
+            psf=None if stated.psf is None else stated.psf.for_camera(measurement.band, None),
+            reflected=stated.reflected,
+        )
+
+    def _part(self, state: State) -> tuple[slice, slice]:
+        size = state.study.corrected_part
+        if size == WHOLE:
+            rows, columns = self.raster.shape
+            return slice(0, rows), slice(0, columns)
+        return _around_cursor(state, self.raster, int(size) // 2)
+
+    def _key(self, state: State) -> Hashable:
+        rows, columns = self._part(state)
+        return state.key(*CORRECTING), self.frame(state), rows.start, columns.start
+
+    def measurement_of(self, picture: Picture) -> Measurement:
+        """Return the frame of a picture."""
+        return self.measured.measurement(self.frame(picture.state))
 
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the numbers at the cursor in K, with the calibration's uncertainty if known."""
-        measurement, index = self.measurement, self.frame(picture.state)
-        data = picture.data
-        if measurement.calibration_errors is not None:
-            effects = measurement.calibration_effects(index)[None]
-            estimate = measurement.estimate(data["measured"].values[None], effects)
-            data = data.assign(uncertainty=(("y", "x"), estimate.standard_uncertainty[0]))
-        return _at(data, picture.raster, picture.state.cursor)
+        numbers = _at(picture.data, picture.raster, picture.state.cursor)
+        frame = self.measured.measurement(self.frame(picture.state))
+        if frame.calibration_errors is not None:
+            row, column = _pixel(picture.raster, picture.state.cursor)
+            pixel = Measurement(frame.data.isel(y=[row], x=[column]))
+            pixel.band = frame.band  # which has its table of radiance already
+            values = np.full((1, 1, 1), numbers["measured"])
+            estimate = pixel.estimate(values, pixel.calibration_effects(0)[None])
+            numbers["uncertainty"] = float(estimate.standard_uncertainty[0, 0, 0])
+        return numbers
 
 
 @dataclass(eq=False)
@@ -558,33 +772,63 @@ class CorrectionModel(_FramesModel):
     name: str
     correction: Correction
     controls: Controls
+    source: str = ""
+    """The file as a session names it."""
+    places: PlacesDescription | None = None
+    """Places and view of the session that was opened."""
     tool: ClassVar[None] = None
-    images: ClassVar[tuple[str, ...]] = ("measured", "corrected", "half_width")
+    _last: dict[int, tuple[Corrected, xr.Dataset, Panel]] = field(
+        init=False, default_factory=dict, repr=False
+    )
 
     @property
     def raster(self) -> Raster:
         return self.correction.raster
 
     @property
+    def images(self) -> tuple[str, ...]:
+        """Names of the images."""
+        return ("measured", "corrected", "half_width")
+
+    @property
     def times(self) -> Array:
         return np.asarray(self.correction.data["time"].values, np.float64)
 
+    def kelvins(self, index: int) -> Array:
+        return np.asarray(self.correction.data["measured"][index].values, np.float64)
+
+    @property
+    def notes(self) -> Notes:
+        """Assumptions and warnings."""
+        return self.correction.notes
+
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
         """Return the frame that began nearest to the state's start."""
-        corrected, raster = Corrected(self.correction, frame=self.frame(state)), self.raster
-        measured = corrected.data["measured"].values
-        data = xr.Dataset(
-            {"measured": (("y", "x"), measured), "flagged": (("y", "x"), np.isnan(measured))}
-        )
+        raster, index = self.raster, self.frame(state)
+        if index not in self._last:
+            corrected = Corrected(self.correction, frame=index)
+            measured = corrected.data["measured"].values
+            data = xr.Dataset(
+                {"measured": (("y", "x"), measured), "flagged": (("y", "x"), np.isnan(measured))}
+            )
+            self._last = {index: (corrected, data, _measured_panel(data, raster))}
+        corrected, data, panel = self._last[index]
         picture = Picture(
-            state, raster, data, {"measured": _measured_panel(data, raster)},
-            _lines(state, raster, data), {}, corrected=corrected,
+            state, raster, data, {"measured": panel}, _lines(state, raster, data), {},
+            corrected=corrected,
         )  # fmt: skip
-        return _with_correction(picture, corrected, self.images)
+        return _with_correction(picture, corrected, ("corrected", "half_width"))
+
+    def measurement_of(self, picture: Picture) -> None:
+        """Return nothing: a correction states no radiance."""
 
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the measured temperature at the cursor in K."""
         return _at(picture.data, picture.raster, picture.state.cursor)
+
+
+def _nearest_time(times: Array, state: State) -> int:
+    return int(np.abs(times - state.study.start).argmin())
 
 
 Model: TypeAlias = SceneModel | MeasurementModel | CorrectionModel
@@ -598,56 +842,107 @@ def with_samples(scene: Scene, count: int, fewer_frames: bool = False) -> Scene:
     return scene.coarser(step, step if fewer_frames else 1)
 
 
-def _around_cursor(state: State, pixels: Raster) -> tuple[slice, slice]:
+def _around_cursor(state: State, pixels: Raster, half: int) -> tuple[slice, slice]:
     """Return the rows and columns of pixels that are corrected; the cursor is well inside."""
     x, y = state.cursor
     places = (pixels.top - y) / pixels.spacing, (x - pixels.left) / pixels.spacing
     middles = (round(place / _STEP) * _STEP for place in places)
     return tuple(  # type: ignore[return-value]
-        slice(max(middle - _HALF, 0), min(middle + _HALF, count))
+        slice(max(middle - half, 0), min(middle + half, count))
         for middle, count in zip(middles, pixels.shape, strict=True)
     )
 
 
+def _with_second(picture: Picture, other: Picture) -> Picture:
+    """Return the images of scene and two cameras on one scale.
+
+    The cameras show temperatures by the emissivities that are set in them.
+    """
+    first, second = (
+        replace(_set_panel(one), name=f"{name} camera{_set_text(one)}")
+        for one, name in ((picture, "First"), (other, "Second"))
+    )
+    scene = picture.panels["scene"]
+    shown = [first, second, *([scene] if scene.unit == "°C" else [])]
+    limits = min(one.limits[0] for one in shown), max(one.limits[1] for one in shown)
+    first, second = (replace(one, limits=limits) for one in (first, second))
+    scene = replace(scene, limits=limits) if scene.unit == "°C" else scene
+    panels = {"scene": scene, "measured": first, "second": second}
+    lines = {}
+    for name, curves in picture.lines.items():
+        line = picture.state.line(name).line(picture.raster.spacing)
+        measured, of_second = (sample(one.values, one.raster, line.points) for one in shown[:2])
+        unknown = np.full_like(measured, nan)
+        lines[name] = {
+            "along": curves["along"], "measured": measured, "reference": unknown,
+            "corrected": of_second,
+        }  # fmt: skip
+    return replace(picture, panels=panels, lines=lines, second=second)
+
+
+def _set_panel(picture: Picture) -> Panel:
+    """Return the temperatures that a camera shows by the emissivity that is set in it."""
+    study, panel, camera = picture.state.study, picture.panels["measured"], picture.camera
+    if study.set_emissivity == 1.0:
+        return panel
+    assert camera is not None
+    reflected = float(surroundings_of(camera).values)
+    known = ObjectParameters(emissivity=study.set_emissivity, reflected=reflected)
+    radiance = camera.band.radiance(panel.values + ZERO_CELSIUS)
+    values = known.temperature(radiance, camera.band) - ZERO_CELSIUS
+    return replace(panel, values=values, limits=ends(values, 0.0, 100.0, 10.0))
+
+
+def _set_text(picture: Picture) -> str:
+    emissivity = picture.state.study.set_emissivity
+    return "" if emissivity == 1.0 else f", emissivity {emissivity:g}"
+
+
 def _with_correction(
-    picture: Picture, corrected: Corrected | None, images: tuple[str, ...]
+    picture: Picture, corrected: Corrected | None, names: tuple[str, ...]
 ) -> Picture:
-    """Return the picture with measured, corrected and one more image, by the names of `images`.
+    """Return the picture with its measured image, and those of a correction by their names.
 
     They are grey where not known.
     """
-    shown, before = picture.state.study.correction_image, picture.panels
+    measured = picture.panels["measured"]
     raster = corrected.correction.raster if corrected else picture.raster
-    unknown = np.full(raster.shape, nan)
-    temperature = corrected.image("corrected") - ZERO_CELSIUS if corrected else unknown
-    limits = before["measured"].limits
+    known = corrected.images if corrected else {}
+    images = {name: known.get(name, _unknown(raster.shape)) for name in names}
+    low, high = measured.limits
+    temperature = images["corrected"]
     if np.isfinite(temperature).any():
-        limits = min(limits[0], np.nanmin(temperature)), max(limits[1], np.nanmax(temperature))
-    title = CORRECTION_IMAGES[shown]
-    third = corrected.image(shown) if corrected else unknown
-    if shown == "true":
-        last = Panel(title, "°C", third - ZERO_CELSIUS, raster, limits, HEAT)
-    elif shown == "error":
-        last = _error_panel(title, third, raster)
-    else:
-        last = Panel(title, "K", third, raster, (0.0, round_limit(third, 98, 5.0)), PLAIN)
-    panels = (
-        replace(before["measured"], limits=limits),
-        Panel("Corrected temperature", "°C", temperature, raster, limits, HEAT),
-        last,
-    )
+        low, high = min(low, np.nanmin(temperature)), max(high, np.nanmax(temperature))
+    panels = {"measured": replace(measured, limits=(low, high))}
+    for name, image in images.items():
+        title = CORRECTION_IMAGES[name]
+        if name == "error":
+            panels[name] = _error_panel(title, image, raster)
+        elif name == "half_width":
+            limits = 0.0, round_limit(image, 98, 5.0)
+            panels[name] = Panel(title, "K", image, raster, limits, PLAIN)
+        else:
+            panels[name] = Panel(title, "°C", image, raster, (low, high), HEAT)
     lines = {
         name: curves | _corrected_line(picture, corrected, name)
         for name, curves in picture.lines.items()
     }
-    by_name = dict(zip(images, panels, strict=True))
-    return replace(picture, panels=by_name, lines=lines, corrected=corrected)
+    others = {name: panel for name, panel in picture.panels.items() if name not in panels}
+    kept = {} if "scene" in others else others
+    return replace(picture, panels=panels | kept, lines=lines, corrected=corrected)
+
+
+@lru_cache(maxsize=2)
+def _unknown(shape: tuple[int, int]) -> Array:
+    """Return an image without values; the same one again, which a page then has already."""
+    return np.full(shape, nan)
 
 
 def _corrected_line(picture: Picture, corrected: Corrected | None, name: str) -> dict[str, Array]:
     """Return the corrected temperature along a line, its interval and the true one in °C."""
     if corrected is None:
-        return {"reference": np.full_like(picture.lines[name]["along"], nan)}
+        unknown = np.full_like(picture.lines[name]["along"], nan)
+        return {"reference": unknown} if "scene" in picture.panels else {}
     data = corrected.data
     if corrected.true is not None:
         data = data.assign(true=(("y", "x"), corrected.true))
@@ -657,6 +952,13 @@ def _corrected_line(picture: Picture, corrected: Corrected | None, name: str) ->
         for key, variable in _LINE_OF.items()
         if variable in data
     }
+
+
+def _pixel(raster: Raster, at: tuple[float, float]) -> tuple[int, int]:
+    """Return row and column of the pixel at x and y in m."""
+    row = int((raster.top - at[1]) / raster.spacing)
+    column = int((at[0] - raster.left) / raster.spacing)
+    return min(max(row, 0), raster.rows - 1), min(max(column, 0), raster.columns - 1)
 
 
 def _at(data: xr.Dataset, raster: Raster, at: tuple[float, float]) -> dict[str, float]:

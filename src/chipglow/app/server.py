@@ -4,13 +4,15 @@ import secrets
 import signal
 import socket
 from contextlib import suppress
+from threading import Thread
 from typing import Any, Final
 
 import panel as pn
 from bokeh.server.auth_provider import AuthProvider
 from tornado.web import RequestHandler
 
-from chipglow.app.opening import OpenFiles
+from chipglow.app.asking_page import AskingPage
+from chipglow.app.opening import Asking, OpenFiles
 from chipglow.app.pictures import Model
 from chipglow.app.view import PageView
 
@@ -50,7 +52,7 @@ class TokenAuth(AuthProvider):  # type: ignore[misc]
 class App:
     """The running app; port 0 means any that is free."""
 
-    def __init__(self, first: Model, address: str = LOCAL, port: int = 0) -> None:
+    def __init__(self, first: Model | Asking, address: str = LOCAL, port: int = 0) -> None:
         port = _free_port(address, port)
         self.files = OpenFiles(first)
         auth = TokenAuth()
@@ -78,6 +80,7 @@ class App:
 
         before = {one: signal.signal(one, end) for one in (signal.SIGINT, signal.SIGTERM)}
         self.server.start()
+        Thread(target=self.files.warm, daemon=True).start()
         try:
             loop.start()
         finally:
@@ -96,6 +99,10 @@ class App:
         opened = self.files.find(key)
         if opened is None:
             return pn.pane.HTML("<p>This file is no longer open: open it again.</p>")
+        if isinstance(opened, Asking):
+            asking = AskingPage(opened, key, self.files)
+            asking.start(pn.state.curdoc)
+            return asking.page
         view = PageView(opened, given, {OPEN: key} if key else {}, self.files)
         view.start(pn.state.curdoc)
         pn.state.on_session_destroyed(lambda _: view.end())

@@ -7,7 +7,7 @@ from threading import Event, Lock, Thread
 from typing import Final, Generic, TypeAlias, TypeVar
 
 from chipglow.app.controls import CORRECTION, State, Texts
-from chipglow.app.pictures import Model, Picture, SceneModel
+from chipglow.app.pictures import CorrectionModel, Model, Picture, SceneModel
 
 PAUSE: Final = 0.15
 """Seconds without a newer state after a quick look before the exact picture is begun."""
@@ -136,7 +136,9 @@ class Session:
         self._draws.ask(self.state)
 
     def cancel(self) -> None:
+        """End draws and a correction."""
         self._draws.cancel()
+        self._pictures.cancel()
 
     def painted(self, number: int) -> None:
         """Note that the page shows a picture, so that the next one may follow."""
@@ -165,16 +167,26 @@ class Session:
         self._notify("numbers", picture, numbers, {})
         if state.study.images == CORRECTION:
             self._correct(picture, numbers)
+        elif state.second is not None:
+            return
         elif contributions := model.contributions(picture, work.check):
             self._notify("numbers", picture, numbers, contributions)
 
     def _correct(self, picture: Picture, numbers: dict[str, float]) -> None:
         """Send the picture again with the corrected image, unless it has it already."""
-        if picture.corrected is not None:
+        model = self.model
+        if picture.corrected is not None or isinstance(model, CorrectionModel):
             return
-        assert isinstance(self.model, SceneModel)
-        self._notify("correcting")
-        corrected = self.model.corrected(picture, self._pictures.check)
+        if needs := model.needs(picture.state):
+            self._notify("needs", needs)
+            return
+        self._notify("correcting", 0.0)
+
+        def check(done: float) -> None:
+            self._pictures.check()
+            self._notify("correcting", done)
+
+        corrected = model.corrected(picture, check)
         self._send(corrected)
         self._notify("numbers", corrected, numbers, {})
 

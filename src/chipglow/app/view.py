@@ -6,7 +6,7 @@ from base64 import b64encode
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
-from math import isfinite
+from math import hypot, isfinite
 from pathlib import Path
 from threading import RLock
 from time import perf_counter
@@ -17,20 +17,39 @@ import panel as pn
 import param
 from bokeh.document import Document
 from jinja2 import Environment, PackageLoader
-from panel.custom import Children, JSComponent
+from panel.custom import Child, Children, JSComponent
 
 from chipglow import __version__
 from chipglow.analysis.attribution import AttributionReference
 from chipglow.analysis.images import PARTS
-from chipglow.app.controls import CORRECTION, ERROR_IMAGES, Texts
+from chipglow.app.asking import description_path
+from chipglow.app.controls import CORRECTION, ERROR_IMAGES, WHOLE, Texts, rounded
 from chipglow.app.figures import TEXT, Figures
+from chipglow.app.measuring import Measuring
+from chipglow.app.opened import Opened
 from chipglow.app.opening import MOST_UPLOADED, OpenFiles
-from chipglow.app.pictures import Drawn, Model, Picture, SceneModel
+from chipglow.app.pictures import Drawn, MeasurementModel, Model, Picture, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.quantities.format import quantity_text, readable, rounded_text, uncertain_decimals
+from chipglow.quantities.units import KELVINS
 
 _FOLDER: Final = Path(__file__).parent
+_DROPPER_STYLE: Final = """
+.filepond--root { margin: 0; font: inherit; min-height: 28px; }
+.filepond--root .filepond--drop-label { min-height: 28px; color: inherit; }
+.filepond--drop-label label { padding: 2px; font-size: 12px; }
+.filepond--panel-root { background-color: rgba(128, 128, 128, 0.12); border: 1px dashed #8a9099; }
+"""
+"""The drop area as high as the buttons next to it, in either theme."""
+
+_VIEW_WIDTH: Final = 160.0
+_VIEW_SAMPLES: Final = 40
+"""Least width of the view of a place in µm, and in pixels or samples."""
+
+_SHOWN_SOURCES: Final = 3
+"""Sources of uncertainty at the cursor that have a bar of their own."""
+
 _log = logging.getLogger(__name__)
 
 
@@ -39,6 +58,9 @@ class Page(JSComponent):  # type: ignore[misc]
 
     html = param.String()
     figures = Children()
+    panels = Children()
+    tools = Child()
+    dropper = Child()
 
     _esm = (_FOLDER / "page.js").read_text(encoding="utf-8")
     _stylesheets: ClassVar[list[str]] = [(_FOLDER / "page.css").read_text(encoding="utf-8")]
@@ -68,15 +90,18 @@ class PageView:
         embedded: bool = False,
     ) -> None:
         self._link, self._files = link or {}, files
-        self._upload: Path | None = None
         self._uploads = Newest(self._open, self._notified)
         self.session = Session(opened, self._notified)
         self._refused = ""
         try:
-            self.session.restore(texts or {})
+            self.session.restore({**_session_texts(opened), **(texts or {})})
         except ValueError as error:
             self._refused = f"Link: {error}"
         self.figures = Figures(opened.raster, opened.tool, opened.images)
+        images = {name: one.figure for name, one in self.figures.images.items()}
+        model, state = self.session.model, self.session.state
+        self.opened = Opened(opened.name, opened.source, opened.notes, images, model.frames(state))
+        self.measuring = Measuring(self.opened, self._later, self._say)
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._show_opened = partial(self._send, "open")
@@ -84,12 +109,20 @@ class PageView:
         self._handled = 0
         self._began = 0.0
         self._picture: Picture | None = None
+        try:
+            if opened.places is not None:
+                self.measuring.restore(opened.places)
+        except ValueError as error:
+            self._refused = f"Session: {error}"
         self.page = Page(
             html=_html(opened, self.figures, files is not None, embedded),
             figures=[
                 pn.pane.Bokeh(one, sizing_mode="fixed", margin=0)
                 for one in self.figures.all.values()
             ],
+            panels=[self.measuring.panel],
+            tools=self.measuring.tools,
+            dropper=self._dropper() if files is not None else None,
             sizing_mode="stretch_width",
         )
         self.page.on_msg(self._receive)
@@ -104,8 +137,16 @@ class PageView:
     def end(self) -> None:
         """End the work for a page that was closed."""
         self.session.end()
-        if self._upload is not None:
-            self._upload.unlink(missing_ok=True)
+        self.measuring.end()
+
+    def _dropper(self) -> pn.widgets.FileDropper:
+        """Return where files are dropped."""
+        dropper = pn.widgets.FileDropper(
+            max_file_size=f"{MOST_UPLOADED // 1024**2}MB", layout="compact", previews=[],
+            width=230, margin=0, stylesheets=[_DROPPER_STYLE],
+        )  # fmt: skip
+        dropper.param.watch(lambda event: self._on_dropped(event.new), "value")
+        return dropper
 
     # Messages of the page
 
@@ -123,10 +164,13 @@ class PageView:
             "cancel": self._on_cancel,
             "chip": self._on_chip,
             "save": self._on_save,
-            "piece": self._on_piece,
             "painted": self.session.painted,
-            "theme": self.figures.set_theme,
+            "theme": self._on_theme,
         }
+
+    def _on_theme(self, theme: str) -> None:
+        self.figures.set_theme(theme)
+        self.measuring.set_theme(theme)
 
     def _act(self, message: dict[str, Any]) -> None:
         self._handled = int(message["n"])
@@ -174,7 +218,7 @@ class PageView:
 
     def _on_cancel(self, _: None) -> None:
         self.session.cancel()
-        self._say("The drawing was cancelled.")
+        self._say("The computation was cancelled.")
 
     def _on_chip(self, theme: str) -> None:
         from chipglow.app.files import chip_picture  # Matplotlib takes long to import
@@ -186,8 +230,11 @@ class PageView:
         from chipglow.app.files import measurement_file, study_file
 
         model, picture = self.session.model, self._picture
-        assert isinstance(model, SceneModel)
-        if name == "study.yaml":
+        if isinstance(model, MeasurementModel):
+            data = model.description.encode()
+        elif not isinstance(model, SceneModel):
+            return
+        elif name == "study.yaml":
             data = study_file(model, self.session.state)
         elif picture is None or picture.quick or picture.state != self.session.state:
             self._say("The exact picture is not ready; save again when it is shown.", "error")
@@ -198,41 +245,32 @@ class PageView:
         self._send("download", {"name": name, "url": url})
         self._say(f"{name} is saved.")
 
-    def _on_piece(self, piece: dict[str, Any]) -> None:
-        """Append a piece of an uploaded file; the last one opens it."""
-        assert self._files is not None
-        if self._upload is None or piece["first"]:
-            self._upload = self._files.new_path()
-        with self._upload.open("ab") as file:
-            file.write(piece["data"])
-            size = file.tell()
-        if size > MOST_UPLOADED:
-            self._upload.unlink()
-        elif piece["last"]:
-            self._uploads.ask((self._upload, piece["name"]))
-            self._upload = None
-        else:
-            self._send("more", None)
+    def _on_dropped(self, files: Mapping[str, bytes | str]) -> None:
+        """Open the file that was dropped; the browser then loads its page."""
+        for name, content in files.items():
+            self._say(f"Opening {name}.", "busy", progress=None)
+            data = content.encode() if isinstance(content, str) else content
+            self._uploads.ask((name, data))
 
-    def _open(self, upload: tuple[Path, str]) -> None:
-        path, name = upload
+    def _open(self, upload: tuple[str, bytes]) -> None:
         assert self._files is not None
-        try:
-            key = self._files.add(path, name)
-        except (ValueError, OSError):
-            path.unlink(missing_ok=True)
-            raise
-        self._notified("opened", key)
+        self._notified("opened", self._files.add(*upload))
 
     # Messages to the page
 
     def _show_picture(self, number: int, picture: Picture) -> None:
         self._picture = picture
         self.figures.show(picture)
+        if not picture.quick:
+            model = self.session.model
+            state = picture.state
+            measured = model.measurement_of(picture)
+            self.opened.show(picture, model.frames(state), model.frame(state), measured)
         self._say(*self._described(picture))
         # The page draws the curves after the images: that halves the time to the images.
         lines = {f"{name}_values": _columns(curves) for name, curves in picture.lines.items()}
         content = {"number": number, "lines": lines, "absent": picture.absent}
+        content["images"] = list(picture.panels)
         self._send("picture", content | {"quick": picture.quick})
 
     def _described(self, picture: Picture) -> tuple[str, str]:
@@ -272,6 +310,7 @@ class PageView:
         parts = {name: numbers[name] for name in (*PARTS, "texture") if name in numbers}
         template = _TEMPLATES.get_template("numbers.html")
         corrected = picture.corrected and picture.corrected.at(picture.state.cursor)
+        largest = _largest(corrected.contributions) if corrected else {}
         html = template.render(
             numbers=numbers,
             texts=_texts(numbers),
@@ -285,14 +324,19 @@ class PageView:
             is_correction=picture.state.study.images == CORRECTION,
             is_corrected=picture.corrected is not None,
             corrected=corrected,
-            shares=_bars(corrected.contributions if corrected else {}),
+            largest=largest,
+            shares=_bars(largest),
+            needs=self.session.model.needs(picture.state),
         )
         self._send("numbers", html)
 
-    def _show_correcting(self) -> None:
-        self._say(
-            "Correcting the pixels around the cursor; this takes seconds.", "busy", progress=None
-        )
+    def _show_correcting(self, done: float) -> None:
+        part = self.session.state.study.corrected_part
+        pixels = "the whole frame" if part == WHOLE else "the pixels around the cursor"
+        self._say(f"Correcting {pixels}.", "busy", progress=done or None)
+
+    def _show_needs(self, needs: str) -> None:
+        self._say(f"Measured image. Set {needs} to correct it.")
 
     def _show_drawn(self, drawn: Drawn) -> None:
         if drawn.state != self.session.state or self._picture is None:
@@ -353,11 +397,31 @@ class PageView:
             document.unhold()
 
 
+def _session_texts(opened: Model) -> dict[str, str]:
+    """Return the controls that the session of an open file states: frame and surroundings."""
+    places, texts = opened.places, dict[str, str]()
+    if places is None:
+        return texts
+    times = opened.frames(opened.controls.initial).times
+    if 0 < places.view.frame < len(times):
+        texts["start"] = f"{1e6 * rounded(float(times[places.view.frame])):.9g} us"
+    if "reflected" in places.given and "camera.reflected" in opened.controls.rows:
+        texts["camera.reflected"] = KELVINS.text(places.reflected)
+    return texts
+
+
 def _columns(curves: Mapping[str, Array]) -> dict[str, list[float]]:
     """Return the curves along a line as the page draws them."""
     unknown = np.full_like(curves["along"], np.nan)
     drawn = {"corrected": unknown, **curves}
     return {key: curve.tolist() for key, curve in drawn.items() if key not in ("low", "high")}
+
+
+def _largest(contributions: Mapping[str, float]) -> dict[str, float]:
+    """Return the largest contributions, and the root of the squares of the others."""
+    ordered = sorted(contributions.items(), key=lambda one: -one[1])
+    others = [value for _, value in ordered[_SHOWN_SOURCES:]]
+    return dict(ordered[:_SHOWN_SOURCES]) | ({"others": hypot(*others)} if others else {})
 
 
 def _bars(values: Mapping[Any, float]) -> dict[Any, float]:
@@ -374,23 +438,34 @@ def _html(opened: Model, figures: Figures, may_upload: bool, embedded: bool) -> 
     spec = {
         "embedded": embedded,
         "version": __version__,
-        "most_uploaded": MOST_UPLOADED,
         "stops": {row.path: row.stops for row in rows},
         "images": list(figures.images),
+        "shown": opened.shown(opened.controls.initial),
         "figures": list(figures.all),
         "extent": figures.extent,
+        "view": max(_VIEW_WIDTH, 1e6 * _VIEW_SAMPLES * opened.raster.spacing),
         "shape": (top - bottom) / (right - left),
     }
     return _TEMPLATES.get_template("page.html").render(
         spec=spec,
         name=opened.name,
         scene=opened.scene if isinstance(opened, SceneModel) else None,
+        description=_description_name(opened),
         may_upload=may_upload,
         groups={row.group: [one for one in rows if one.group == row.group] for row in rows},
         images={name: one.figure.title.text for name, one in figures.images.items()},
         lines={name: one.figure.title.text for name, one in figures.lines.items()},
         draws=f"{PHASES}² positions of the pixels, {TEXTURES} textures",
     )
+
+
+def _description_name(opened: Model) -> str:
+    """Return the name under which the settings of a camera file are saved; empty without any."""
+    if not (isinstance(opened, MeasurementModel) and opened.description):
+        return ""
+    name = Path(opened.name)
+    is_description = name.suffix.lower() in (".yaml", ".yml")
+    return name.name if is_description else description_path(name).name
 
 
 def _texts(numbers: Mapping[str, float]) -> dict[str, str]:

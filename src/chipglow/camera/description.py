@@ -18,7 +18,7 @@ from chipglow.camera.optics.blurs import BLURS
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import sensor_raster
 from chipglow.camera.optics.terms import OPTICS_TERMS, OpticsTerm
-from chipglow.quantities import Array, Parameter, made_from
+from chipglow.quantities import SEED, Array, Parameter, made_from
 from chipglow.quantities.units import LENGTH, TIME, Position
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import PAPER_BAND
@@ -114,7 +114,7 @@ class CameraDescription(CameraSettings):
             "Seed of the detector noise; a frame's noise depends on the seed and its start time.",
             least=0,
         ),
-    ] = 2010
+    ] = SEED
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 MEASUREMENT_UNITS: Final = {"radiance_temperature": "K", "radiance": "W m-2 sr-1", "flags": "1"}
 """Variables of every measurement, and their units."""
 
+WHOLE: Final = slice(None)
+"""All frames, rows or columns."""
+
 
 class Flag(IntFlag):
     """Pixel faults; of the flagged pixels, only `REPLACED` ones have a radiance temperature."""
@@ -185,6 +188,15 @@ class Measurement:
         data = self.data.copy(deep=False)
         data.attrs = {**other, **tool_attributes(tool)}
         return Measurement(data)
+
+    def part(
+        self, frames: slice = WHOLE, rows: slice = WHOLE, columns: slice = WHOLE
+    ) -> "Measurement":
+        """Return some frames, rows and columns; they share the tables of the band."""
+        part = Measurement(self.data.isel(time=frames, y=rows, x=columns))
+        if "band_lower" in self.data.attrs:
+            part.band = self.band
+        return part
 
     @property
     def flags(self) -> NDArray[np.uint8]:

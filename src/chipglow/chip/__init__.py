@@ -21,4 +21,8 @@ from chipglow.chip.segmentation import (
     resolution_warnings as resolution_warnings,
     segmentation as segmentation,
 )
-from chipglow.chip.shear_band import ShearBand as ShearBand, find_shear_band as find_shear_band
+from chipglow.chip.shear_band import (
+    ShearBand as ShearBand,
+    find_shear_band as find_shear_band,
+    first_crossing as first_crossing,
+)

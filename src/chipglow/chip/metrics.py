@@ -1,6 +1,6 @@
 """The chip's shape, motion and shear band: what describes its segmentation."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import nan
 from typing import Any, Final
 
@@ -9,13 +9,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.chip.segment import contact_length, shear_band
 from chipglow.chip.segmentation import (
+    ForceMeans,
     Segmentation,
     cut_history,
     mean_and_deviation,
     resolution,
     segmentation,
 )
-from chipglow.chip.shear_band import ShearBand
+from chipglow.chip.shear_band import MIDDLE_HALF, ShearBand
 from chipglow.quantities import ROUNDING, Array, Brief
 from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
@@ -44,9 +45,6 @@ _DEVELOPED: Final = 0.5
 _CHIP_POINTS: Final = 33
 """Points across the middle half of the chip at which speed and strain are read."""
 
-_FORCES: Final = ("cutting_mean", "cutting_swing", "thrust_mean", "thrust_swing")
-"""Metrics that a `CutHistory` states."""
-
 
 @dataclass(frozen=True, repr=False)
 class ChipScan(Brief):
@@ -61,7 +59,7 @@ class ChipScan(Brief):
 
 
 @dataclass(frozen=True, repr=False)
-class ChipMetrics(Segmentation):
+class ChipMetrics(Segmentation, ForceMeans):
     """Segments and more of a chip; lengths in m, times in s, forces in N/m of width.
 
     A ``…_standard_deviation`` describes the averaged values, NaN for one value.
@@ -98,11 +96,6 @@ class ChipMetrics(Segmentation):
     """Largest median strain rate in 1/s on the band's middle half in a frame."""
     band_strain: float
     """Largest plastic strain in the middle half of `valley` that passes `scan`, per segment."""
-    cutting_mean: float
-    cutting_swing: float
-    thrust_mean: float
-    thrust_swing: float
-    """Forces as in `CutHistory`; NaN without a force history."""
     scan: ChipScan
     """Position and times of the thickness."""
 
@@ -136,7 +129,7 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     bands = _developed_bands(scene, frames[::_FRAMES_A_BAND])
     contact, contact_deviation = mean_and_deviation(contacts)
     measured: dict[str, Any] = {
-        **{name: getattr(history, name, nan) for name in _FORCES},
+        **{one.name: getattr(history, one.name, nan) for one in fields(ForceMeans)},
         **vars(segments),
         **passing,
         **_with_deviation("shear_angle", [_angle(band) for band in bands]),
@@ -193,7 +186,7 @@ def _passing(
     if not windows:
         return {"thickness": nan, "band_strain": nan, **_with_deviation("chip_speed", [])}
     valleys = [scan.thickness[window].min() for window in windows]
-    depth = np.linspace(0.25, 0.75, _CHIP_POINTS) * float(np.mean(valleys))
+    depth = np.linspace(*MIDDLE_HALF, _CHIP_POINTS) * float(np.mean(valleys))
     points = tool.rake_point(scan.height) + depth[:, None] * np.array(tool.rake_normal)
     right, up, strain = (
         np.stack([sample(scene.field(name, k), scene.raster, points) for k in frames])

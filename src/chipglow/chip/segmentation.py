@@ -89,7 +89,20 @@ def _mean_and_uncertainty(values: Array) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, repr=False)
-class CutHistory(Brief):
+class ForceMeans(Brief):
+    """Mean forces per width in N/m, and their mean range from one peak of the chip to the next.
+
+    They are NaN without two peaks, and without a history of the forces.
+    """
+
+    cutting_mean: float
+    cutting_swing: float
+    thrust_mean: float
+    thrust_swing: float
+
+
+@dataclass(frozen=True, repr=False)
+class CutHistory(ForceMeans):
     """Forces per width in N/m and thickness in m over time in s; segments after the build-up."""
 
     time: Array
@@ -98,11 +111,6 @@ class CutHistory(Brief):
     thickness: Array
     start: float
     """Time in s from which the history counts."""
-    cutting_mean: float
-    cutting_swing: float
-    thrust_mean: float
-    thrust_swing: float
-    """Mean, and mean range from one peak of the chip to the next; NaN without two peaks."""
     segmentation: Segmentation
 
 
@@ -115,7 +123,15 @@ def cut_history(scene: Scene) -> CutHistory | None:
     segments = segmentation(time[first:], thickness[first:], resolution(scene))
     ends = np.searchsorted(time, segments.peaks)
     forces = *_mean_and_swing(cutting, first, ends), *_mean_and_swing(thrust, first, ends)
-    return CutHistory(time, cutting, thrust, thickness, float(time[first]), *forces, segments)
+    return CutHistory(
+        *forces,
+        time=time,
+        cutting=cutting,
+        thrust=thrust,
+        thickness=thickness,
+        start=float(time[first]),
+        segmentation=segments,
+    )
 
 
 def resolution(scene: Scene) -> float:

@@ -5,7 +5,7 @@ from math import ceil
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from chipglow.chip.ridge import (
@@ -37,6 +37,9 @@ samples across."""
 
 _WIDEST: Final = 80e-6
 """Largest half-width of a band in m."""
+
+MIDDLE_HALF: Final = (0.25, 0.75)
+"""Middle half of a length, as fractions of it."""
 
 _NO_RIDGE: Final = "shear band: no ridge of the plastic strain rate is off the rake face"
 
@@ -86,7 +89,7 @@ class ShearBand(Brief):
     def middle_half(self) -> NDArray[np.bool_]:
         """Which points are on the middle half of the curve, shape (n,)."""
         fraction = (self.ridge.distance - self.start) / self.length
-        return (fraction >= 0.25) & (fraction <= 0.75)
+        return (fraction >= MIDDLE_HALF[0]) & (fraction <= MIDDLE_HALF[1])
 
     def across(self, half_length: float, step: float) -> Line:
         """Return a line across the band's middle, from the workpiece to the chip."""
@@ -167,17 +170,33 @@ def _widths(points: Array, raster: Raster, rate: Array) -> Array:
         np.nan_to_num(sample(rate, raster, across_curve(points, sign * offsets)))
         for sign in (-1.0, 1.0)
     )
-    return _half_crossing(below, offsets) + _half_crossing(above, offsets)
+    left, right = (first_crossing(side, offsets, side[:, 0] / 2) for side in (below, above))
+    return np.asarray(left + right)
 
 
-def _half_crossing(values: Array, offsets: Array) -> Array:
-    """Return the offset where each row falls to half its first value; NaN where it never does."""
-    half = values[:, :1] / 2
-    below = values <= half
+def first_crossing(values: Array, places: Array, level: ArrayLike) -> Array:
+    """Return the place where each row first falls to its level, straight between samples.
+
+    Parameters
+    ----------
+    values : ndarray
+        Rows of samples, shape (row, n).
+    places : ndarray
+        Places of the samples of a row, shape (n,).
+    level : array_like
+        The level, of all rows or shape (row,).
+
+    Returns
+    -------
+    ndarray
+        Places, shape (row,); NaN where a row does not begin above its level or never falls to it.
+    """
+    levels = np.broadcast_to(np.asarray(level, np.float64), len(values))
+    below = values <= levels[:, None]
     first = np.maximum(below.argmax(axis=1), 1)
     index = np.arange(first.size)
     upper, lower = values[index, first - 1], values[index, first]
     drop = upper - lower
-    fraction = np.divide(upper - half[:, 0], drop, out=np.zeros_like(drop), where=drop > 0)
-    crossing = offsets[first - 1] + fraction * (offsets[first] - offsets[first - 1])
-    return np.where(below.any(axis=1) & (values[:, 0] > 0), crossing, np.nan)
+    fraction = np.divide(upper - levels, drop, out=np.zeros_like(drop), where=drop > 0)
+    crossing = places[first - 1] + fraction * (places[first] - places[first - 1])
+    return np.where(below.any(axis=1) & (values[:, 0] > levels), crossing, np.nan)

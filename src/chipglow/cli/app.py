@@ -173,8 +173,8 @@ def open_app(
         Path | None,
         opt.argument(
             "[PATH]",
-            "Scene or measurement (NetCDF), study (YAML) or results folder. Default: a small "
-            "bundled scene.",
+            "Scene or measurement (NetCDF), camera file, file of another program, study or "
+            "session (YAML), or results folder. Default: a small bundled scene.",
             show_default=False,
         ),
     ] = None,
@@ -191,7 +191,7 @@ def open_app(
         bool, opt.flag("--browser/--no-browser", "Open the page in a browser.")
     ] = True,
 ) -> None:
-    """Change camera settings in a browser and see the error change. Stop with Ctrl-C."""
+    """Open a file in a browser; change camera settings and see the error. Stop with Ctrl-C."""
     import webbrowser
 
     from chipglow.app import serve

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from chipglow.cli import options as opt
 from chipglow.cli.chip import chosen_frames
-from chipglow.cli.emissivity import doubts, emissivities_of
+from chipglow.cli.emissivity import doubts, emissivities_of, origin_of
 from chipglow.cli.screen import current, figure, finish
 
 _LARGEST_MISFIT: Final = 4.0
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from chipglow.camera import Camera, Measurement
     from chipglow.correction import Correction
-    from chipglow.scene import Region
+    from chipglow.laboratory.emissivity import PlacesDescription
     from chipglow.text import Notes
 
 
@@ -39,7 +39,8 @@ def correct(
         opt.value(
             "FILE|NUMBER",
             "Output of chipglow emissivity with the names of the regions, and 'tool' for a tool "
-            "(NetCDF), or one emissivity for all, e.g. 0.42.",
+            "(NetCDF), or one emissivity for all, e.g. 0.42. Default: as the file of the regions "
+            "states.",
         ),
     ] = None,
     emissivity_map: Annotated[
@@ -104,7 +105,7 @@ def correct(
     from chipglow.correction import place_frame, places_of, write_correction
     from chipglow.correction.figure import draw_correction
     from chipglow.io.result_file import write_frame
-    from chipglow.laboratory.emissivity import load_regions
+    from chipglow.laboratory.emissivity import load_places
     from chipglow.laboratory.recordings import load_measurement
 
     known = {
@@ -115,9 +116,10 @@ def correct(
         "--reflected": reflected,
         "--reflected-uncertainty": reflected_uncertainty,
     }
-    _check_options(study, psf, known)
+    described = None if regions is None else load_places(regions)
+    _check_options(study, psf, known, described)
     measurement = _frames(load_measurement(image, settings or ()), frame)
-    named = () if regions is None else load_regions(regions)
+    named = () if described is None else described.places()
     with progress_bars() as progress:
         progress("correction", 0.0)
         if study is not None:
@@ -138,7 +140,7 @@ def correct(
             result = _corrected(
                 measurement,
                 camera,
-                named,
+                described,
                 known,
                 emissivity_uncertainty,
                 psf_uncertainty=psf_uncertainty,
@@ -156,7 +158,12 @@ def correct(
     )
 
 
-def _check_options(study: Path | None, psf: Path | None, known: "dict[str, Any]") -> None:
+def _check_options(
+    study: Path | None,
+    psf: Path | None,
+    known: "dict[str, Any]",
+    described: "PlacesDescription | None",
+) -> None:
     """Raise a ValueError if options lack each other or exclude each other."""
     if study is None and psf is None:
         raise ValueError("--psf: is missing; give --psf with --emissivity, or --study")
@@ -167,7 +174,8 @@ def _check_options(study: Path | None, psf: Path | None, known: "dict[str, Any]"
                 f"--study: cannot be combined with {name}, as the study states camera and surface"
             )
         return
-    if known["--emissivity"] is None and known["--map"] is None:
+    stated = described is not None and described.emissivities
+    if known["--emissivity"] is None and known["--map"] is None and not stated:
         raise ValueError("--emissivity: give a file of chipglow emissivity, or a number; or --map")
     if known["--map"] is not None:
         for name in [one for one in ("--emissivity", "--elsewhere") if one in given]:
@@ -212,7 +220,7 @@ def _camera(measurement: "Measurement", psf: Path) -> "tuple[Camera, Notes]":
 def _corrected(
     measurement: "Measurement",
     camera: "Camera",
-    regions: "tuple[Region, ...]",
+    described: "PlacesDescription | None",
     known: "dict[str, Any]",
     emissivity_uncertainty: float | None,
     **settings: Any,
@@ -222,9 +230,13 @@ def _corrected(
     from chipglow.laboratory import emissivity as lab
 
     tool, file = measurement.tool, known["--map"] or known["--emissivity"]
+    places = () if described is None else described.places()
+    regions = tuple(place for place in places if place.has_area)
+    if described is not None:
+        settings["surroundings"] = described.surroundings()
     if known["--reflected"] is not None or known["--reflected-uncertainty"] is not None:
         settings["surroundings"] = lab.reflected_temperature(
-            known["--reflected"] or 293.0, known["--reflected-uncertainty"] or 0.0
+            known["--reflected"] or lab.LABORATORY, known["--reflected-uncertainty"] or 0.0
         )
     if known["--map"] is not None:
         shapes: tuple[Any, ...] = regions if tool is None else (*regions, tool)
@@ -232,11 +244,10 @@ def _corrected(
             measurement, camera, lab.read_emissivity_map(file), shapes, **settings
         )
         return result.with_notes(doubts(lab.read_origin(file), [measurement]))
-    lines = emissivities_of(file, emissivity_uncertainty)
+    lines = emissivities_of(file, emissivity_uncertainty, described)
     parts = known_parts(lines, regions, tool, known["--elsewhere"])
     result = correct_known(measurement, camera, parts, **settings)
-    origin = lab.read_origin(file) if isinstance(lines, dict) else None
-    return result.with_notes(doubts(origin, [measurement]))
+    return result.with_notes(doubts(origin_of(file), [measurement]))
 
 
 def _doubts(result: "Correction") -> "Notes":

@@ -134,13 +134,13 @@ def temperature(
     ],
     regions: opt.RegionsFile,
     emissivity: Annotated[
-        str,
+        str | None,
         opt.value(
             "FILE|NUMBER",
             "Output of chipglow emissivity for regions of the same names (NetCDF), or one "
-            "emissivity for all, e.g. 0.42.",
+            "emissivity for all, e.g. 0.42. Default: as the file of the regions states.",
         ),
-    ],
+    ] = None,
     emissivity_uncertainty: Annotated[
         float | None, opt.value("NUMBER", "Standard uncertainty of an emissivity given as number.")
     ] = None,
@@ -156,7 +156,8 @@ def temperature(
         float | None,
         opt.temperature(
             "Temperature of the surroundings that the object reflects. Default: as in the "
-            "determination of the emissivity, with the same error, or 293 K."
+            "determination of the emissivity, with the same error, as the file of the regions "
+            "states, or 293 K."
         ),
     ] = None,
     reflected_uncertainty: opt.ReflectedUncertainty = None,
@@ -183,13 +184,15 @@ def temperature(
 
     if each and study is not None:
         raise ValueError("--each and --study cannot be combined: a study is of one measurement")
-    named = lab.load_regions(regions)
-    surroundings = None
+    described = lab.load_places(regions)
+    named, surroundings = described.places(), described.surroundings()
     if reflected is not None or reflected_uncertainty is not None:
-        surroundings = lab.reflected_temperature(reflected or 293.0, reflected_uncertainty or 0.0)
+        surroundings = lab.reflected_temperature(
+            reflected or lab.LABORATORY, reflected_uncertainty or 0.0
+        )
     fitted = None if calibration is None else load_calibration(calibration)
-    lines = emissivities_of(emissivity, emissivity_uncertainty)
-    origin = lab.read_origin(emissivity) if isinstance(lines, dict) else None
+    lines = emissivities_of(emissivity, emissivity_uncertainty, described)
+    origin = origin_of(emissivity)
 
     def found(
         measurements: "list[Measurement]", names: list[str]
@@ -301,20 +304,43 @@ def _correct(
 
 
 def emissivities_of(
-    text: str, uncertainty: float | None
+    text: str | None, uncertainty: float | None, described: "lab.PlacesDescription | None"
 ) -> "lab.EmissivityLine | dict[str, lab.EmissivityLine]":
-    """Return the emissivities of an option: a file's by their names, or one number for all."""
+    """Return the emissivities of an option: a file's by their names, or one number for all.
+
+    Without the option they are those that the file of the regions states.
+    """
     from chipglow.laboratory import emissivity as lab
 
-    try:
-        number = float(text)
-    except ValueError:
-        if uncertainty is not None:
-            raise ValueError(
-                "--emissivity-uncertainty: the file states it, omit the option"
-            ) from None
+    if text is not None and _is_number(text):
+        return lab.EmissivityLine.constant(float(text), uncertainty or 0.0)
+    if uncertainty is not None:
+        raise ValueError("--emissivity-uncertainty: the file states it, omit the option")
+    if text is not None:
         return lab.read_emissivity_lines(Path(text))
-    return lab.EmissivityLine.constant(number, uncertainty or 0.0)
+    if described is None or not described.emissivities:
+        raise ValueError(
+            "--emissivity: is missing; give a file of chipglow emissivity or a number, or state "
+            "emissivities in the file of the regions"
+        )
+    return described.known()
+
+
+def origin_of(emissivity: str | None) -> "Origin | None":
+    """Return band and metal of the emissivities of an option, if it names a file."""
+    from chipglow.laboratory import emissivity as lab
+
+    if emissivity is None or _is_number(emissivity):
+        return None
+    return lab.read_origin(emissivity)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _print(result: "lab.RegionTemperatures") -> None:

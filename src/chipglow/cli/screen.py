@@ -163,11 +163,12 @@ def figure(draw: "Callable[..., Figure]", *arguments: Any) -> Callable[[Path], N
     """Return a function that draws a figure and writes it in the format of the file's name."""
 
     def write(path: Path) -> None:
+        from chipglow.drawing.drawing import DPI
         from chipglow.io import atomic_path
 
         drawn = draw(*arguments)
         with atomic_path(path) as temporary:
-            drawn.savefig(temporary, format=path.suffix[1:].lower(), dpi=150)
+            drawn.savefig(temporary, format=path.suffix[1:].lower(), dpi=DPI)
 
     return write
 

@@ -58,7 +58,7 @@ class Friction(Part):
         float,
         zero_to_one("Limit of the friction stress, as a fraction of the chip's shear flow stress."),
     ] = 1.0
-    conductance: float = 1e7
+    conductance: float = 1e7  # in W/(m² K)
     thermal_exponent: Annotated[
         float | None,
         Parameter(
@@ -190,6 +190,7 @@ class Numerics(Part):
     points_per_side: Annotated[
         int, Parameter("Material points along the side of a cell.", least=1, most=4)
     ] = 2
+    # Borders of the computed region in m, beyond what the cut heats and strains.
     upstream: float = 0.75e-3
     downstream: float = 0.55e-3
     depth: float = 0.35e-3

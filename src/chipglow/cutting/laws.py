@@ -19,6 +19,9 @@ MELTING_LIMIT = 3000.0
 _LEAST_STRENGTH = 0.01
 """Fraction of the cold strength that a liquid keeps, so that points never lose all stiffness."""
 
+_COLDEST = 1e-30
+"""Homologous temperature of which the logarithm is taken at 0: no power of it is felt."""
+
 _LEAST_STRAIN = 1e-12
 """Smallest plastic strain of which the logarithm is taken."""
 
@@ -37,7 +40,7 @@ def _thermal(temperature, law):  # type: ignore[no-untyped-def]
     """Return 1 − θᵐ."""
     heat = homologous(temperature, law)
     m = law.thermal_exponent
-    return 1.0 - (heat if m == 1.0 else exponential(m * logarithm(max(heat, 1e-30))))
+    return 1.0 - (heat if m == 1.0 else exponential(m * logarithm(max(heat, _COLDEST))))
 
 
 @njit(**INLINE)

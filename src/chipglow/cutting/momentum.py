@@ -47,6 +47,7 @@ VELOCITY_VALUES = SUMMED
 VELOCITY_X, VELOCITY_Y, CHANGE_X, CHANGE_Y = range(VELOCITY_VALUES)
 """A node's velocity after a step and its change in the step, in m/s."""
 
+# Their number and their names.
 SUMS = 9
 (
     FORCE_X, FORCE_Y, BOUNDARY_WORK, CONTACT_WORK, PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS,
@@ -125,6 +126,7 @@ def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
     (vx, vy, dx, dy), (cxx, cyx, _, _), (cxy, cyy, _, _) = sum_nodes(
         velocity, i, j, wx, wy, _distances(ax), _distances(ay)
     )
+    # The weights of quadratic splines have a second moment of a quarter of a squared cell.
     scale = 4.0 * inverse
     p.vx, p.vy = vx, vy
     # In this order of the sums cuts stay the same to the last bit from version to version.
@@ -146,6 +148,7 @@ def _scatter(p, soft, tension, fx, fy, limit, nodes, grid, step):  # type: ignor
         return False
     wx, wy = spline_weights(ax), spline_weights(ay)
     mass = step.mass
+    # The second moment again.
     force = 4.0 * inverse * step.time_step * p.volume
     spread = mass * grid.cell
     qxx, qxy, qyx, qyy = spread * p.cxx, spread * p.cxy, spread * p.cyx, spread * p.cyy

@@ -177,6 +177,7 @@ def held_energy(points, count, step, elastic, cell):  # type: ignore[no-untyped-
     for k in range(count):
         p = points[k]
         spread = p.cxx * p.cxx + p.cxy * p.cxy + p.cyx * p.cyx + p.cyy * p.cyy
+        # Second moment of the weights of quadratic splines: a quarter of a squared cell.
         kinetic += p.own_vx * p.own_vx + p.own_vy * p.own_vy + 0.25 * cell * cell * spread
         warm = kelvin_index(p.temperature, elastic.shape[0])
         sheared, pressed = elastic_energy(p, elastic[warm, SHEAR], elastic[warm, BULK], step)

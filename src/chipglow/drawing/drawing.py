@@ -24,6 +24,13 @@ WIDTH: Final = 7.2
 _MARGIN: Final = 3
 """Pixels on the left of a column of panels."""
 
+DPI: Final = 150
+"""Pixels per inch of written figures."""
+
+BAR_ASPECT: Final = 25
+"""Length of a colour bar over its width."""
+
+# Text and lines in points, for a figure as wide as the text of a page.
 _STYLE: Final[Any] = {
     "font.size": 9.5,
     "axes.titlesize": 10,
@@ -72,11 +79,11 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     """Write a figure as PNG at 150 dots per inch and as SVG; images in it stay images."""
     png, svg = folder / f"{name}.png", folder / f"{name}.svg"
     if layout := figure.get_layout_engine():  # once; `savefig` repeats it for each file
-        figure.set_dpi(150)
+        figure.set_dpi(DPI)
         layout.execute(figure)
         figure.set_layout_engine(None)
-    figure.savefig(png, dpi=150)
-    figure.savefig(svg, dpi=150, metadata={"Date": None})
+    figure.savefig(png, dpi=DPI)
+    figure.savefig(svg, dpi=DPI, metadata={"Date": None})
     return png, svg
 
 
@@ -159,7 +166,9 @@ def colour_bar(
     extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(
         (under, over), "neither"
     )
-    figure.colorbar(picture, ax=axes, label=label, extend=extend, aspect=25, location=location)
+    figure.colorbar(
+        picture, ax=axes, label=label, extend=extend, aspect=BAR_ASPECT, location=location
+    )
 
 
 def legend(

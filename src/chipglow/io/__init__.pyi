@@ -15,6 +15,7 @@ from .importing import (
 )
 from .measurement_file import (
     is_measurement as is_measurement,
+    open_measurement as open_measurement,
     read_measurement as read_measurement,
     write_dataset as write_dataset,
     write_measurement as write_measurement,

@@ -40,6 +40,7 @@ _LONGEST_TEXT: Final = 64 * 1024**2
 """Bytes of a JSON text: a survey of a million times has them in an array."""
 
 _LENGTH_BYTES: Final = 8
+"""Bytes of the length before each message."""
 
 
 class AnswerError(ValueError):

@@ -37,6 +37,9 @@ _CHIP_STARTS, _CHIP_ENDS = 0.3, 0.5
 _MOST_FILLED: Final = 0.5
 """Fraction of filled samples above which it is a warning."""
 
+_FAINTEST: Final = 1e-30
+"""Least scale of a pattern without light: as float32 it and its inverse are finite."""
+
 _FLOW_FRAMES: Final = 5
 """Number of frames over which the optical flow is computed: little moves from one to the next."""
 
@@ -319,7 +322,7 @@ def optical_flow(
     from skimage import registration
 
     factor = min(_FLOW_SAMPLES / max(before.shape), 1.0)
-    scale = np.float32(max(float(before.max()), float(after.max()), 1e-30))
+    scale = np.float32(max(float(before.max()), float(after.max()), _FAINTEST))
     small = [zoom(pattern / scale, factor, order=1) for pattern in (before, after)]
     down, right = registration.optical_flow_tvl1(*small, dtype=np.float32)
     back = [_resized(flow, before.shape) for flow in (right, -down)]

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final, Literal
 from chipglow.io.completion import Completion
 from chipglow.io.importing import FieldOfView, Import
 from chipglow.io.measurement_file import holds
-from chipglow.io.sandbox import Isolated
+from chipglow.io.sandbox import Isolated, Sandbox
 from chipglow.io.sources import Placement, Units
 from chipglow.io.sources.grids.grid import GridSource
 from chipglow.io.sources.meshes.mesh import MeshSource
@@ -111,7 +111,7 @@ class ImportDescription(Part):
         known = {one.name for one in fields(section)}
         source = replace(section, **{name: stated[name] for name in stated.keys() & known})
         return Import(
-            Isolated(source, Path(self.source or "movie").name),
+            Isolated(source, Sandbox(Path(self.source or "movie").name)),
             self.field_of_view,
             replace(self.completion, tool=self.tool.build() if self.tool else None),
             adapter(type(self)).dump_python(self, mode="json"),

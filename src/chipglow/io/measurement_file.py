@@ -61,14 +61,25 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     return read_dataset(Path(path), Measurement, "a measurement", "a NetCDF-4 file")
 
 
-def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, kind: str) -> Made:
-    """Return `made_of` the data of a NetCDF-4 file, which should be `what` in a file of `kind`."""
+def open_measurement(path: str | os.PathLike[str]) -> Measurement:
+    """Open a measurement whose frames are read when they are asked for; see `read_measurement`."""
+    return read_dataset(Path(path), Measurement, "a measurement", "a NetCDF-4 file", by_frame=True)
+
+
+def read_dataset(
+    path: Path, made_of: Callable[[xr.Dataset], Made], what: str, kind: str, by_frame: bool = False
+) -> Made:
+    """Return `made_of` the data of a NetCDF-4 file, which should be `what` in a file of `kind`.
+
+    The data are in memory, or with `by_frame` in the file until they are used.
+    """
     check_regular(path)
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such file, expected {what}")
     try:
-        check_file(path)
-        data = xr.load_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
+        check_file(path, by_frame)
+        read = xr.open_dataset if by_frame else xr.load_dataset
+        data = read(path, engine="h5netcdf", decode_times=False, phony_dims="access")
         return made_of(data)
     except MemoryLimitError as error:
         raise ValueError(f"{path}: {error}") from None

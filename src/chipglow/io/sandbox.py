@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import IO, Any, Final, TypeAlias, TypeVar
+from weakref import finalize
 
 from chipglow.io.answers import (
     ANSWER,
@@ -150,36 +151,51 @@ class Isolated(Source):
     """Another source, read in a subprocess: see `Sandbox`."""
 
     source: Source
-    name: str
-    memory: int = MEMORY
-    patience: float = PATIENCE
+    sandbox: Sandbox
 
     def survey(self) -> Survey:
-        return self._sandbox.answer(self.source.survey)
+        return self.sandbox.answer(self.source.survey)
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
-        with self._sandbox.answers(partial(self.source.frames, raster, start)) as answers:
+        with self.sandbox.answers(partial(self.source.frames, raster, start)) as answers:
             yield from answers
 
-    @property
-    def _sandbox(self) -> Sandbox:
-        return Sandbox(self.name, self.patience, self.memory)
+
+class ReaderProcess:
+    """A process that waits for the next file between uses, as its start takes 2 s.
+
+    A process whose reader failed is replaced.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: list[subprocess.Popen[bytes]] = []
+        self.close = finalize(self, _end_all, self._waiting)
+        """Ends the process; so does the end of this object."""
+
+    @contextmanager
+    def used(self) -> Iterator[None]:
+        """Read files in this process within the block."""
+        token = _KEPT.set(self._waiting)
+        try:
+            yield
+        finally:
+            _KEPT.reset(token)
+
+
+def _end_all(waiting: "list[subprocess.Popen[bytes]]") -> None:
+    while waiting:
+        _end(waiting.pop())
 
 
 @contextmanager
 def one_process() -> Iterator[None]:
-    """Let the readers of many files use one process, one after another, as its start takes 2 s.
-
-    A process whose reader failed is replaced.
-    """
-    kept: list[subprocess.Popen[bytes]] = []
-    token = _KEPT.set(kept)
+    """Let the readers of many files use one process, one after another."""
+    process = ReaderProcess()
     try:
-        yield
+        with process.used():
+            yield
     finally:
-        _KEPT.reset(token)
-        for process in kept:
-            _end(process)
+        process.close()
 
 
 def _started() -> "subprocess.Popen[bytes]":

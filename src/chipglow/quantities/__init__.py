@@ -21,7 +21,7 @@ from chipglow.quantities.part import (
     rederived as rederived,
     unchecked as unchecked,
 )
-from chipglow.quantities.quotient import quotient as quotient
+from chipglow.quantities.quotient import TINY as TINY, quotient as quotient
 from chipglow.quantities.settings import (
     Setting as Setting,
     changed as changed,
@@ -34,6 +34,7 @@ from chipglow.quantities.settings import (
 )
 from chipglow.quantities.units import (
     ROUNDING as ROUNDING,
+    SEED as SEED,
     ZERO_CELSIUS as ZERO_CELSIUS,
     Array as Array,
     Quantity as Quantity,

@@ -1,9 +1,14 @@
 """Quotients of arrays whose divisor may be zero."""
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chipglow.quantities.units import Array
+
+TINY: Final = 1e-300
+"""Smaller than any quantity in SI units: the least divisor where 0 / 0 shall be 0, not NaN."""
 
 
 def quotient(part: Array, whole: ArrayLike) -> Array:

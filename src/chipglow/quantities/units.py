@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from pint import UnitRegistry
 
 Array: TypeAlias = NDArray[np.float64]
+SEED: Final = 2010
+"""Seed of random numbers, unless another is set: the year of the paper."""
+
 ZERO_CELSIUS: Final = 273.15
 """In K."""
 

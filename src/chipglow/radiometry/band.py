@@ -5,7 +5,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import ceil, inf
 from numbers import Real
 from typing import Any, Final, TypeAlias
@@ -44,6 +44,12 @@ _NEWTON_STEPS: Final = 60
 
 _NODES_PER_PANEL: Final = 16
 """Gauss nodes of each panel of an integral over wavelength."""
+
+_GAUSS: Final = np.polynomial.legendre.leggauss(_NODES_PER_PANEL)
+"""These nodes and their weights, between -1 and 1."""
+
+_SHARED_BANDS: Final = 16
+"""Bands of which the tables are kept for others with the same limits: 0.6 MB each."""
 
 _TEMPERATURE_STEP: Final = 0.25
 """Step in K of the table of radiances."""
@@ -175,7 +181,7 @@ class Band:
         """
         values = _as_floats(radiance)
         result = np.empty_like(values)
-        if _look_up_temperature(values.ravel(), *self._inverse_table, result.ravel()):
+        if _look_up_temperature(values.ravel(), *self._tabulated._inverse_table, result.ravel()):
             outside = np.isnan(result) & (values > 0) & np.isfinite(values)
             result[outside] = self._invert(values[outside].astype(np.float64))
         return result
@@ -234,9 +240,18 @@ class Band:
         kelvins = np.asarray(temperature, np.float64)[..., None]
         return wavelength, spectral_radiance(wavelength, kelvins) * weights
 
-    @cached_property
+    @property
     def radiance_table(self) -> Array:
         """Radiance and its derivative at every 0.25 K from 200 K to 6000 K, shape (n, 2)."""
+        return self._tabulated._radiance_table
+
+    @property
+    def _tabulated(self) -> "Band":
+        """The equal band that has the tables: one for all with the same limits and no response."""
+        return _band_of_limits(self.lower, self.upper) if self.response is None else self
+
+    @cached_property
+    def _radiance_table(self) -> Array:
         count = round((HOTTEST - COLDEST) / _TEMPERATURE_STEP) + 1
         temperature = COLDEST + _TEMPERATURE_STEP * np.arange(count, dtype=np.float64)
         return np.stack(self._with_slope(temperature), axis=1)
@@ -250,7 +265,7 @@ class Band:
             panels = max(panels, _RESPONSE_PANELS)
         # Over 1/λ the integrand is a cubic times an exponential: smooth however wide the band.
         edges = np.linspace(1 / self.upper, 1 / self.lower, panels + 1)
-        node, weight = np.polynomial.legendre.leggauss(_NODES_PER_PANEL)
+        node, weight = _GAUSS
         middle, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
         wavelength = 1.0 / (middle[:, None] + half[:, None] * node).ravel()
         weights = (half[:, None] * weight).ravel() * wavelength**2
@@ -302,6 +317,11 @@ class Band:
             if (np.abs(step) <= 1e-14 * inverse).all():  # rounding
                 break
         return 1.0 / inverse
+
+
+@lru_cache(_SHARED_BANDS)
+def _band_of_limits(lower: float, upper: float) -> Band:
+    return Band(lower, upper)
 
 
 def _as_floats(values: ArrayLike) -> NDArray[np.floating]:

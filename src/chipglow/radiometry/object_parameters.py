@@ -11,6 +11,22 @@ from chipglow.quantities.units import TEMPERATURE
 from chipglow.radiometry.band import Band
 
 
+def blackbody_radiance(radiance: ArrayLike, emissivity: ArrayLike, reflected: ArrayLike) -> Array:
+    """Return the radiance of a blackbody at the temperature of an object, (L − (1 − ε) L_refl) / ε.
+
+    Parameters
+    ----------
+    radiance : array_like
+        Radiance L of the object in W/(m² sr), the reflected part included.
+    emissivity : array_like
+        Emissivity ε of the object.
+    reflected : array_like
+        Radiance of the surroundings in W/(m² sr).
+    """
+    light, fraction = np.asarray(radiance, np.float64), np.asarray(emissivity, np.float64)
+    return np.asarray((light - (1 - fraction) * np.asarray(reflected, np.float64)) / fraction)
+
+
 @dataclass(frozen=True)
 class ObjectParameters(Part):
     """Parameters with which a camera computes the temperature that it shows.
@@ -38,5 +54,5 @@ class ObjectParameters(Part):
         """Return the temperature in K that is shown for a received radiance."""
         reflected, atmosphere = band.radiance([self.reflected, self.atmosphere])
         left = np.asarray(radiance, np.float64) - (1 - self.transmittance) * atmosphere
-        left = left / self.transmittance - (1 - self.emissivity) * reflected
-        return np.asarray(band.temperature(left / self.emissivity), np.float64)
+        emitted = blackbody_radiance(left / self.transmittance, self.emissivity, reflected)
+        return np.asarray(band.temperature(emitted), np.float64)

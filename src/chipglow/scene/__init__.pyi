@@ -15,7 +15,9 @@ from .raster import Raster as Raster
 from .regions import (
     Area as Area,
     Circle as Circle,
+    Pixel as Pixel,
     Polygon as Polygon,
+    Polyline as Polyline,
     Region as Region,
     areas as areas,
     shared_pixels as shared_pixels,

@@ -28,6 +28,9 @@ SPEED: Final = "speed"
 _LARGEST_IN_MICRONS: Final = 5e-3
 """Length in m from which axes are in millimetres."""
 
+_SLOWEST: Final = 1e-30
+"""Strain rate in 1/s of which the logarithm is taken where nothing is strained."""
+
 _DECADES: Final = 3
 """Decades of a scale of strain rates."""
 
@@ -165,7 +168,7 @@ def field_panels(frame: Frame) -> list[ImagePanel]:
 def _decades(rate: NDArray[Any]) -> tuple[float, float]:
     fastest = ends(rate, 0.0, 99.9)[1]
     # A power of ten is its own top, whatever the rounding of the logarithm.
-    top = float(np.ceil(np.log10(max(fastest, 1e-30)) - 1e-9))
+    top = float(np.ceil(np.log10(max(fastest, _SLOWEST)) - 1e-9))
     return 10.0 ** (top - _DECADES), 10.0**top
 
 

@@ -33,6 +33,14 @@ def straight_line(origin: ArrayLike, direction: ArrayLike, distance: ArrayLike) 
     return Line(distances, points)
 
 
+def polyline(corners: NDArray[np.float64], pitch: float) -> Line:
+    """Return points every half pixel from corner to corner, shape (n, 2)."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+    distance = np.linspace(0.0, along[-1], max(round(2 * along[-1] / pitch), 1) + 1)
+    points = [np.interp(distance, along, coordinate) for coordinate in corners.T]
+    return Line(distance, np.stack(points, axis=1))
+
+
 def sample(image: ArrayLike, raster: Raster, points: ArrayLike) -> NDArray[np.float64]:
     """Return an image (y, x) at points (..., 2) in m, bilinear between its samples' centres.
 
@@ -45,10 +53,18 @@ def sample(image: ArrayLike, raster: Raster, points: ArrayLike) -> NDArray[np.fl
 
 def nearest(image: ArrayLike, raster: Raster, points: ArrayLike) -> NDArray[np.float64]:
     """Return an image (y, x) at points (..., 2) in m: the sample that holds each; NaN outside."""
-    places = np.asarray(points, dtype=np.float64)
-    column = np.floor((places[..., 0] - raster.left) / raster.spacing).astype(np.int64)
-    row = np.floor((raster.top - places[..., 1]) / raster.spacing).astype(np.int64)
+    row, column = nearest_sample(raster, points)
     inside = (column >= 0) & (column < raster.columns) & (row >= 0) & (row < raster.rows)
     values = np.full(inside.shape, np.nan)
     values[inside] = np.asarray(image)[row[inside], column[inside]]
     return values
+
+
+def nearest_sample(
+    raster: Raster, points: ArrayLike
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return row and column of the samples that hold points (..., 2) in m, each of shape (...)."""
+    places = np.asarray(points, dtype=np.float64)
+    column = np.floor((places[..., 0] - raster.left) / raster.spacing).astype(np.int64)
+    row = np.floor((raster.top - places[..., 1]) / raster.spacing).astype(np.int64)
+    return row, column

@@ -1,4 +1,4 @@
-"""Regions of interest of an image: polygons, rectangles and circles with names."""
+"""Places of an image with names: points, lines, and regions such as polygons and circles."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.quantities import Brief
+from chipglow.scene.lines import Line, nearest_sample, polyline
 from chipglow.scene.raster import Raster
 
 Point: TypeAlias = tuple[float, float]
@@ -28,7 +29,7 @@ def in_polygon(corners: Sequence[Point], x: ArrayLike, y: ArrayLike) -> NDArray[
     for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
         if y1 != y2:
             crossed = (y1 > y) != (y2 > y)
-            inside ^= crossed & (x < x1 + (y - y1) * (x2 - x1) / (y2 - y1))
+            inside[crossed] ^= x[crossed] < x1 + (y[crossed] - y1) * (x2 - x1) / (y2 - y1)
     return inside
 
 
@@ -86,11 +87,55 @@ class Circle:
 
 
 @dataclass(frozen=True)
+class Pixel:
+    """The pixel that contains a point."""
+
+    point: Point
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.point).all():
+            raise ValueError(f"point: is {self.point!r}, expected numbers")
+
+    @property
+    def outline(self) -> NDArray[np.float64]:
+        """The point, shape (1, 2)."""
+        return np.array([self.point], np.float64)
+
+    def holds(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return False for all points: a point has no area."""
+        return np.zeros(np.broadcast(x, y).shape, np.bool_)
+
+
+@dataclass(frozen=True)
+class Polyline:
+    """The pixels along a line from corner to corner."""
+
+    corners: tuple[Point, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.corners) < 2:
+            raise ValueError(f"line: has {len(self.corners)} corners, expected 2 or more")
+        if not np.isfinite(self.corners).all():
+            raise ValueError("line: a corner is not finite, expected numbers")
+        if not (np.hypot(*np.diff(np.array(self.corners), axis=0).T) > 0).all():
+            raise ValueError("line: two corners are the same, expected a line")
+
+    @property
+    def outline(self) -> NDArray[np.float64]:
+        """Its corners, shape (n, 2)."""
+        return np.array(self.corners, np.float64)
+
+    def holds(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return False for all points: a line has no area."""
+        return np.zeros(np.broadcast(x, y).shape, np.bool_)
+
+
+@dataclass(frozen=True)
 class Region:
-    """A part of an image with a name."""
+    """A place of an image with a name: the pixels in a polygon or circle, or at a point or line."""
 
     name: str
-    shape: Polygon | Circle
+    shape: Polygon | Circle | Pixel | Polyline
     feature: str = ""
     """Regions of one feature, such as "chip body", are taken together; by default its own name."""
     unit: Literal["pixel", "m"] = "pixel"
@@ -104,12 +149,33 @@ class Region:
         if not self.feature:
             object.__setattr__(self, "feature", self.name)
 
+    @property
+    def has_area(self) -> bool:
+        """Whether it is a polygon or a circle, and not a point or a line."""
+        return isinstance(self.shape, Polygon | Circle)
+
+    def line(self, raster: Raster) -> Line:
+        """Return points every half pixel along its outline, the distance in m from the first."""
+        return polyline(self.outline(raster), raster.spacing)
+
     def mask(self, raster: Raster) -> NDArray[np.bool_]:
-        """Return which pixels have their centre in the region, shape (y, x)."""
+        """Return the pixels of the place, shape (y, x).
+
+        They have their centre in a region, contain a point, or are on a line.
+        """
         self._check_inside(raster)
+        if not self.has_area:
+            return self._crossed(raster)
         columns, rows = np.arange(raster.columns) + 0.5, np.arange(raster.rows) + 0.5
-        x, y = (columns, rows) if self.unit == "pixel" else (raster.x, raster.y)
-        mask = self.shape.holds(*np.meshgrid(x, y))
+        is_pixel = self.unit == "pixel"
+        x, y = (columns, rows) if is_pixel else (raster.x, raster.y)
+        side = 1.0 if is_pixel else raster.spacing
+        across, down = (
+            np.flatnonzero((centres > ends.min() - side) & (centres < ends.max() + side))
+            for centres, ends in zip((x, y), self.shape.outline.T, strict=True)
+        )
+        mask = np.zeros(raster.shape, np.bool_)
+        mask[np.ix_(down, across)] = self.shape.holds(*np.meshgrid(x[across], y[down]))
         if not mask.any():
             raise ValueError(f"region {self.name}: is empty: it contains no pixel centre")
         return mask
@@ -121,6 +187,16 @@ class Region:
             return points
         corner = np.array([raster.left, raster.top])
         return np.asarray(corner + raster.spacing * points * [1.0, -1.0])
+
+    def _crossed(self, raster: Raster) -> NDArray[np.bool_]:
+        """Return the pixels that contain a point of the place."""
+        is_line = isinstance(self.shape, Polyline)
+        points = self.line(raster).points if is_line else self.outline(raster)
+        row, column = nearest_sample(raster, points)
+        mask = np.zeros(raster.shape, np.bool_)
+        # A point on the right or the lower edge belongs to the last pixel.
+        mask[row.clip(0, raster.rows - 1), column.clip(0, raster.columns - 1)] = True
+        return mask
 
     def _check_inside(self, raster: Raster) -> None:
         points = self.outline(raster)

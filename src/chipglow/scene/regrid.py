@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from chipglow.quantities import ROUNDING
+from chipglow.quantities import ROUNDING, TINY
 from chipglow.scene.frame import Material
 
 Taps = tuple[NDArray[np.int64], NDArray[np.float64]]
@@ -33,7 +33,7 @@ def taps(centres: NDArray[np.float64], spacing: float, wanted: NDArray[np.float6
         number = first[:, None] + np.arange(min(int(np.ceil(ratio)) + 2, centres.size))
         covered = np.minimum(high[:, None], number + 0.5) - np.maximum(low[:, None], number - 0.5)
         weights = np.clip(covered, 0.0, None) / ratio
-        weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-30)
+        weights /= np.maximum(weights.sum(axis=1, keepdims=True), TINY)
     weights[~inside] = 0.0
     return first, weights
 

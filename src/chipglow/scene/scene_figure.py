@@ -110,7 +110,7 @@ def _draw_material(
     colours = ListedColormap([_COLOURS[kind] for kind in Material])
     ends = (-0.5, len(Material) - 0.5)
     picture = show_image(axes, frame.material, raster, tool, colours, ends)
-    bar = figure.colorbar(picture, ax=axes, aspect=25, ticks=list(Material))
+    bar = figure.colorbar(picture, ax=axes, aspect=drawing.BAR_ASPECT, ticks=list(Material))
     bar.ax.set_yticklabels([kind.name.lower() for kind in Material], rotation=90, va="center")
     axes.set_title("material")
     axes.label_outer()

@@ -12,8 +12,10 @@ from chipglow.analysis import attribute
 from chipglow.camera import UNUSABLE, Camera
 from chipglow.camera.chain import Chain, ExposedChain
 from chipglow.camera.exposure import surroundings_radiance
+from chipglow.chip import first_crossing
 from chipglow.laboratory.emissivity import SurfaceFile
 from chipglow.quantities import ZERO_CELSIUS, Array, Brief, changed
+from chipglow.radiometry import blackbody_radiance
 from chipglow.scene import Scene, scenes
 from chipglow.study.budgets import check_draws
 from chipglow.study.camera_section import CameraSection
@@ -268,8 +270,9 @@ class _View:
         x = right + self.pitch * (np.arange(row.size) + 0.5)
         hottest, beside = int(np.argmax(row)), (row[0] + row[-1]) / 2
         reflected = surroundings_radiance(camera.band, camera.reflected)
-        light = float(camera.band.radiance(row[hottest])) - (1 - self.emissivity) * reflected
-        corrected = float(camera.band.temperature(light / self.emissivity))
+        seen = camera.band.radiance(row[hottest])
+        light = blackbody_radiance(seen, self.emissivity, reflected)
+        corrected = float(camera.band.temperature(light))
         rise = row[hottest] - beside
         width = _width(x, row, hottest, beside + rise / 2)
         return _Row(x, row, np.array([row[hottest], corrected, rise, width]), bool(lost[hottest]))
@@ -277,15 +280,11 @@ class _View:
 
 def _width(x: Array, row: Array, hottest: int, level: float) -> float:
     """Return the width in m at a level, straight between pixels; NaN if a side stays above it."""
-    below = np.flatnonzero(row < level)
-    left, right = below[below < hottest], below[below > hottest]
-    if not left.size or not right.size:
-        return float("nan")
-    ends = []
-    for outer, inner in ((left[-1], left[-1] + 1), (right[0], right[0] - 1)):
-        part = (level - row[outer]) / (row[inner] - row[outer])
-        ends.append(x[outer] + part * (x[inner] - x[outer]))
-    return float(ends[1] - ends[0])
+    sides = ((row[hottest::-1], x[hottest::-1]), (row[hottest:], x[hottest:]))
+    left, right = (
+        float(first_crossing(values[None], places, level)[0]) for values, places in sides
+    )
+    return right - left
 
 
 def _inputs(study: Study) -> tuple[Inputs, list[str]]:

@@ -33,7 +33,7 @@ from chipglow.study.schema import Study
 from chipglow.surface import Surface
 from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Budget, Estimate, Input, Inputs, budget, first_order
-from chipglow.uncertainty.budget import VALIDATED, check_numbers
+from chipglow.uncertainty.budget import SAMPLES, TRIALS, VALIDATED, check_numbers
 from chipglow.uncertainty.surrogate import Surrogate
 
 if TYPE_CHECKING:
@@ -176,8 +176,8 @@ class StudyBudget:
 def study_budget(
     study: Study,
     at: Sequence[str] = (),
-    trials: int = 3000,
-    samples: int = 256,
+    trials: int = TRIALS,
+    samples: int = SAMPLES,
     scenes: int = _SCENES,
     progress: Progress | None = None,
 ) -> StudyBudget:

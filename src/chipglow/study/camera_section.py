@@ -21,7 +21,7 @@ from chipglow.camera import (
     lower_range_limit,
 )
 from chipglow.io.column_file import read_response
-from chipglow.quantities import FileBeside, Parameter, Part, made_from, unchecked
+from chipglow.quantities import SEED, FileBeside, Parameter, Part, made_from, unchecked
 from chipglow.quantities.units import COLDEST, LENGTH, POSITION, WAVELENGTHS
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import PAPER_BAND
@@ -186,14 +186,14 @@ class CameraSection(CameraSettings, CameraModel):
             )
         return pitch
 
-    def build(self, seed: int = 2010) -> Camera:
+    def build(self, seed: int = SEED) -> Camera:
         """Return the camera with its array, or with as many pixels as see a scene.
 
         `on` also places the array on a scene.
         """
         return unchecked(self._camera, seed=seed)
 
-    def on(self, scene: Raster, seed: int = 2010) -> Camera:
+    def on(self, scene: Raster, seed: int = SEED) -> Camera:
         """Return the camera on a scene, with the pixels of its array that see it, centred."""
         camera = unchecked(self._camera, seed=seed, shape=None)
         if self.array is None:

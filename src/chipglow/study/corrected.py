@@ -19,7 +19,7 @@ from chipglow.camera import (
 )
 from chipglow.laboratory.emissivity import RegionTemperatures, TrueTemperature
 from chipglow.laboratory.emissivity.observations import UNIFORMITY
-from chipglow.quantities import ZERO_CELSIUS, Array, changed
+from chipglow.quantities import SEED, ZERO_CELSIUS, Array, changed
 from chipglow.quantities.units import FREQUENCY, TEMPERATURE, TIME, Quantity
 from chipglow.radiometry import Band
 from chipglow.study.budgets import first_order_errors, reader, readings_of
@@ -39,9 +39,6 @@ _COVERAGE: Final = 2.0
 
 _DRAWS: Final = 64
 """Draws of a study's inputs for its image of a place; their standard deviation is known to 9 %."""
-
-_SEED: Final = 2010
-"""Seed of the draws, so that the same files give the same numbers."""
 
 _MUST_AGREE: Final[dict[str, Quantity]] = {
     "integration_time": TIME,
@@ -77,7 +74,7 @@ class CorrectedTemperature:
     @cached_property
     def distribution(self) -> MonteCarlo:
         """Distribution of the corrected temperature by the model itself (JCGM 101:2008)."""
-        return monte_carlo(self._model, *self._inputs, generator=np.random.default_rng(_SEED))
+        return monte_carlo(self._model, *self._inputs, generator=np.random.default_rng(SEED))
 
     @property
     def residual(self) -> float:

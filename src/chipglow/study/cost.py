@@ -7,7 +7,6 @@ from typing import Final
 
 from numba import get_num_threads
 
-from chipglow.cutting import CuttingSimulation
 from chipglow.quantities import setting_at, value_text
 from chipglow.quantities.units import LENGTH
 from chipglow.scene import Raster
@@ -60,13 +59,32 @@ class Cost:
     memory: float
 
 
+@dataclass(frozen=True)
+class _Parts:
+    """Parts of a cost, by the setting that determines each most."""
+
+    seconds: dict[str, float]
+    disk: float
+    solver_memory: float
+    """Bytes during the cut."""
+    analysis_memory: dict[str, float]
+    """Bytes during the analysis, after the cut."""
+
+    @property
+    def memory(self) -> dict[str, float]:
+        """Bytes by setting, of cut and analysis."""
+        return {_CELL: self.solver_memory, **self.analysis_memory}
+
+    @property
+    def cost(self) -> Cost:
+        """The whole cost."""
+        needed = max(self.solver_memory, sum(self.analysis_memory.values()))
+        return Cost(_ALWAYS + sum(self.seconds.values()), self.disk, _MEMORY + needed)
+
+
 def expected_cost(study: Study) -> Cost:
     """Return the cost of a study on this machine, accurate within about a factor of two."""
-    return Cost(
-        seconds=_ALWAYS + sum(_seconds(study).values()),
-        disk=_disk(study),
-        memory=_MEMORY + max(_solver_memory(study), sum(_analysis_memory(study).values())),
-    )
+    return _parts(study).cost
 
 
 def check_cost(study: Study) -> None:
@@ -79,13 +97,13 @@ def check_cost(study: Study) -> None:
     ValueError
         If it takes more than a year, or more disk than the cache has left.
     """
-    cost, seconds = expected_cost(study), _seconds(study)
-    memory = {_CELL: _solver_memory(study), **_analysis_memory(study)}
-    check_memory(_largest(study, memory), cost.memory)
+    parts = _parts(study)
+    cost = parts.cost
+    check_memory(_largest(study, parts.memory), cost.memory)
     if cost.seconds > _LONGEST:
         raise ValueError(
-            f"{_largest(study, seconds)}: the study takes about {cost.seconds / 86400:.2g} days, "
-            f"expected up to {_LONGEST / 86400:.0f}"
+            f"{_largest(study, parts.seconds)}: the study takes about "
+            f"{cost.seconds / 86400:.2g} days, expected up to {_LONGEST / 86400:.0f}"
         )
     folder = cache_folder()
     while not folder.exists():
@@ -116,43 +134,32 @@ def _valued(study: Study, path: str) -> str:
     return f"{path}: {value_text(setting.value, setting.parameter.quantity)}"
 
 
-def _seconds(study: Study) -> dict[str, float]:
-    """Return times in s by the setting that determines each most."""
+def _parts(study: Study) -> _Parts:
+    """Return the parts of the cost of a study."""
     cutting, window = study.cutting, study.cutting.window
-    samples = float(cutting.field_of_view.rows) * cutting.field_of_view.columns
+    raster, cell = cutting.field_of_view.build(), cutting.numerics.cell
+    simulation = cutting.simulation()
+    samples = float(raster.rows) * raster.columns
+    kept = window.later_bands * ceil(window.band_duration / window.interval)
+    frames = ceil(cutting.duration / window.interval) + kept
     exposed = ceil(study.camera.integration_time / window.interval)
     exposures = study.analysis.exposures + window.later_bands + 1
-    return {
-        _CELL: cutting.simulation().point_steps / (_POINT_STEPS * get_num_threads()),
-        _INTERVAL: _SECONDS_A_SAMPLE * _frames(study) * samples,
-        _EXPOSURES: _ANALYSIS_SECONDS * exposures * exposed * samples,
-    }
-
-
-def _frames(study: Study) -> int:
-    window = study.cutting.window
-    kept = window.later_bands * ceil(window.band_duration / window.interval)
-    return ceil(study.cutting.duration / window.interval) + kept
-
-
-def _disk(study: Study) -> float:
-    view, cell = study.cutting.field_of_view, study.cutting.numerics.cell
-    down, across = (n * view.spacing / cell + _NODES_BEYOND for n in (view.rows, view.columns))
-    return _BYTES_A_NODE * _frames(study) * down * across
-
-
-def _solver_memory(study: Study) -> float:
-    simulation: CuttingSimulation = study.cutting.simulation()
-    return _MEMORY_A_POINT * simulation.point_count
-
-
-def _analysis_memory(study: Study) -> dict[str, float]:
-    """Return bytes by the setting that determines them."""
-    raster = study.cutting.field_of_view.build()
-    return {
-        _SPACING: _MEMORY_A_SAMPLE * raster.rows * raster.columns,
-        _PITCH: _MEMORY_A_SAMPLE * _pixels(raster, study.camera),
-    }
+    nodes_down, nodes_across = (
+        n * raster.spacing / cell + _NODES_BEYOND for n in (raster.rows, raster.columns)
+    )
+    return _Parts(
+        seconds={
+            _CELL: simulation.point_steps / (_POINT_STEPS * get_num_threads()),
+            _INTERVAL: _SECONDS_A_SAMPLE * frames * samples,
+            _EXPOSURES: _ANALYSIS_SECONDS * exposures * exposed * samples,
+        },
+        disk=_BYTES_A_NODE * frames * nodes_down * nodes_across,
+        solver_memory=_MEMORY_A_POINT * simulation.point_count,
+        analysis_memory={
+            _SPACING: _MEMORY_A_SAMPLE * samples,
+            _PITCH: _MEMORY_A_SAMPLE * _pixels(raster, study.camera),
+        },
+    )
 
 
 def _pixels(raster: Raster, camera: CameraSection) -> float:

@@ -34,6 +34,7 @@ class FieldOfViewSection(Raster):
     By default nine samples along a pixel of 6 µm, over 690 µm × 780 µm about the tip.
     """
 
+    # In m; see above.
     left: float = -650e-6
     top: float = 700e-6
     spacing: float = 2 / 3e6

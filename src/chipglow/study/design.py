@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from chipglow.analysis.outside import MOST_OUTSIDE
 from chipglow.analysis.single import BELOW, RANDOM, SATURATED
 from chipglow.quantities import Array, Brief, Quantity, setting_at
 from chipglow.scene import Scene
@@ -16,6 +17,7 @@ from chipglow.study.budgets import check_draws, errors_of, reader, readings_of
 from chipglow.study.running import Progress, fitted_study, silent
 from chipglow.study.schema import Study
 from chipglow.study.sweeps import (
+    SAMPLES,
     Impossible,
     Method,
     axis,
@@ -30,6 +32,9 @@ from chipglow.uncertainty import Input, Inputs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+DRAWS: Final = 1024
+"""Draws of the inputs for the last settings, unless stated."""
 
 _KEPT: Final = 4
 """A round keeps one setting of this many, and draws this many times as often."""
@@ -153,10 +158,10 @@ def design(
     vary: Mapping[str, str | Sequence[Any]],
     at: Sequence[str] = (),
     method: Method = "grid",
-    samples: int = 64,
-    draws: int = 1024,
-    below: float = 0.05,
-    saturated: float = 0.05,
+    samples: int = SAMPLES,
+    draws: int = DRAWS,
+    below: float = MOST_OUTSIDE,
+    saturated: float = MOST_OUTSIDE,
     progress: Progress | None = None,
 ) -> Design:
     """Find the settings with the smallest bias and uncertainty of single readings.

@@ -132,7 +132,9 @@ class CutPicture:
         for axes, (title, label, colours, limits, extend) in zip(panels, looks, strict=True):
             log = extend == "both"
             image = show_image(axes, empty, self._raster, self._tool, colours, limits, log=log)
-            self._figure.colorbar(image, ax=axes, label=label, extend=extend, aspect=25)
+            self._figure.colorbar(
+                image, ax=axes, label=label, extend=extend, aspect=drawing.BAR_ASPECT
+            )
             axes.set_title(title)
             axes.label_outer()
             self._images.append(image)

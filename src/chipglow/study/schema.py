@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 
 from chipglow.analysis import AttributionPlan, CorrectionPlan, Plan, WavelengthPlan
 from chipglow.camera import AnnularAperturePSF
-from chipglow.quantities import ROUNDING, FileBeside, Parameter, Part, changed
+from chipglow.quantities import ROUNDING, SEED, FileBeside, Parameter, Part, changed
 from chipglow.study.camera_section import CameraSection
 from chipglow.study.cutting_section import STEADY, CuttingSection
 from chipglow.study.scaling import resolved
@@ -38,7 +38,7 @@ class Study(Part):
     title: Annotated[str, Parameter("Title of the report.")] = (
         "Reproduction of Heigel and Whitenton (2010) by chipglow"
     )
-    seed: Annotated[int, Parameter("Seed of all random numbers.", least=0)] = 2010
+    seed: Annotated[int, Parameter("Seed of all random numbers.", least=0)] = SEED
     scene: Annotated[
         FileBeside | None,
         Parameter(

@@ -83,7 +83,7 @@ def _draw_map(
             colour = "white" if abs(value) > _DARK * limit else "black"
             text = f"{value:.0f}".replace("-", "−")
             panel.text(column, row, text, ha="center", va="center", color=colour)
-    figure.colorbar(picture, ax=panel, label="error / K", aspect=25)
+    figure.colorbar(picture, ax=panel, label="error / K", aspect=drawing.BAR_ASPECT)
 
 
 def _axis(values: Any, setting: str, quantities: _Quantities) -> tuple[Any, str]:

@@ -44,6 +44,9 @@ FRACTIONS: Final = ("below_range", "saturated")
 MOST_POINTS: Final = 100_000
 """Points of a sweep: each is a file in one folder, and a study in memory."""
 
+SAMPLES: Final = 64
+"""Sampled settings, unless stated: 2⁶, as Sobol's sequence is even for powers of 2."""
+
 _POINTS: Final = "points"
 _SCRATCH: Final = "workers"
 """Folder of the worker processes in that of a sweep, while they run."""
@@ -191,7 +194,7 @@ def sweep(
     out: str | Path,
     at: Sequence[str] = (),
     method: Method = "grid",
-    samples: int = 64,
+    samples: int = SAMPLES,
     seed: int = 0,
     client: Client | None = None,
     workers: int | None = None,

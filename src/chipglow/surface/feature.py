@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import SEED, Parameter, Part
 from chipglow.quantities.units import LENGTH
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import PAPER_BAND
@@ -83,7 +83,7 @@ class FeatureSurface(FeatureSettings, Surface):
     shear_band: Annotated[Emissivity, Parameter("Shear bands: the paper's fissures.")]
     seed: Annotated[
         int, Parameter("Seed of the textures; each feature has a separate stream.", least=0)
-    ] = 2010
+    ] = SEED
     origin: Origin = UNKNOWN  # type: ignore[misc]
 
     @cached_property

@@ -11,6 +11,7 @@ MEMORY_VARIABLE: Final = "CHIPGLOW_MEMORY"
 """Environment variable that states another limit than the memory available, such as ``64 GB``."""
 
 _SIZE: Final = re.compile(r"(\d+(?:\.\d+)?)\s*([kMGT]?)B", re.ASCII)
+# SI prefixes.
 _FACTORS: Final = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12}
 
 

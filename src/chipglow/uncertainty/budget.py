@@ -16,6 +16,12 @@ from chipglow.uncertainty.monte_carlo import MonteCarlo, adaptive
 Model: TypeAlias = Callable[[Array], Array]
 """Takes values of the inputs, shape (trial, input); returns the outputs, shape (trial, output)."""
 
+TRIALS: Final = 3000
+"""Trials of the Monte Carlo, unless stated: the interval scatters by 2.5 % of its half-width."""
+
+SAMPLES: Final = 256
+"""Draws of the inputs for the indices of Sobol, unless stated."""
+
 _DRAWS: Final = 64
 """Draws at which one input alone is changed."""
 
@@ -73,8 +79,8 @@ def budget(
     model: Model,
     inputs: Inputs,
     generator: np.random.Generator,
-    trials: int = 3000,
-    samples: int = 256,
+    trials: int = TRIALS,
+    samples: int = SAMPLES,
     level: float = 0.95,
     progress: Callable[[str, float], None] = lambda step, part: None,
 ) -> Budget:

@@ -63,7 +63,7 @@ class Input:
 
     name: str
     value: float = 0.5
-    standard_uncertainty: float = sqrt(1 / 12)
+    standard_uncertainty: float = sqrt(1 / 12)  # of evenly distributed numbers from 0 to 1
     distribution: InputDistributionKind = "random"
     degrees_of_freedom: float = inf
     values: tuple[float, ...] = ()

@@ -25,7 +25,7 @@ from chipglow.camera.optics.kernel import (
     resized,
 )
 from chipglow.camera.optics.psf import PSFS, ApertureChoice, Obscuration, PointSpreadFunction
-from chipglow.quantities import Array, Parameter
+from chipglow.quantities import Array, Parameter, Part
 from chipglow.quantities.units import POSITION
 from chipglow.radiometry import Band
 
@@ -134,7 +134,27 @@ SourceTemperature = Annotated[
 
 
 @dataclass(frozen=True)
-class PupilPSF(PointSpreadFunction):
+class _Aperture(PointSpreadFunction):
+    """Band and aperture, which come first of a `PupilPSF`."""
+
+    band: Band
+    numerical_aperture: Annotated[
+        float, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
+    ]
+
+
+@dataclass(frozen=True)
+class Wavefront(Part):
+    """What shapes the light of an aperture, and its spectrum."""
+
+    obscuration: Obscuration = 0.0
+    defocus: Defocus = 0.0
+    zernike: Aberrations = ()
+    temperature: SourceTemperature = 1000.0
+
+
+@dataclass(frozen=True)
+class PupilPSF(Wavefront, _Aperture):
     """Diffraction of a pupil with obscuration, defocus and aberrations, over a camera's band.
 
     Wavelengths are weighted by the spectral radiance of a blackbody and by the band's response
@@ -165,15 +185,6 @@ class PupilPSF(PointSpreadFunction):
     falls as a / (2π r³) with a = λ / (π² NA (1 − o)) for any aberrations. This tail is subtracted
     in closed form before the sum over frequencies and added after it, so that no light is lost.
     """
-
-    band: Band
-    numerical_aperture: Annotated[
-        float, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
-    ]
-    obscuration: Obscuration = 0.0
-    defocus: Defocus = 0.0
-    zernike: Aberrations = ()
-    temperature: SourceTemperature = 1000.0
 
     def __str__(self) -> str:
         of = f", obscured to {self.obscuration:g} of its diameter" if self.obscuration else ""
@@ -335,7 +346,7 @@ class PupilPSF(PointSpreadFunction):
 
 @PSFS.part
 @dataclass(frozen=True)
-class Pupil(ApertureChoice):
+class Pupil(Wavefront, ApertureChoice):
     """A pupil with obscuration, defocus and aberrations, over the camera's band."""
 
     kind = "pupil"
@@ -343,10 +354,6 @@ class Pupil(ApertureChoice):
         "{kind: pupil, numerical_aperture: 0.28, obscuration: 0.35, defocus: 10 um,\n"
         "    zernike: {11: 0.2 um}}"
     )
-    obscuration: Obscuration = 0.0
-    defocus: Defocus = 0.0
-    zernike: Aberrations = ()
-    temperature: SourceTemperature = 1000.0
 
     def for_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
         lens = self.obscuration, self.defocus, self.zernike, self.temperature

@@ -139,6 +139,14 @@ class CameraFile(ABC):
                 **file.facts(chosen),
             )
 
+    @classmethod
+    def all_times(cls, path: Path, interval: float | None) -> Array:
+        """Return the times of all whole frames in s; see `CameraFormat`."""
+        with opened(path) as binary:
+            file = cls(binary, Notes())
+            every = chosen_frames(path, None, file.complete, 0)
+            return file.times(every) if interval is None else evenly(every, interval)
+
     def stamped(self, chosen: range, stamps: Array | None, rate: float) -> Array:
         """Return stamps in s after the first frame if they ascend, or times by a rate in Hz."""
         if stamps is not None:

@@ -194,6 +194,7 @@ def _curve() -> NDArray[np.uint16]:
     The maker publishes a table. This is the curve of Recommendation ITU-R BT.709 with constants
     fitted to it: within two counts of the table, and clipped where it is.
     """
+    # Codes of black and white, the curve's constants near 0.099, 0.45 and 4.5, and its counts.
     codes = np.arange(1024)
     fraction = (codes - 63.5573) / (1041.4199 - 63.5573)
     power = (np.maximum(fraction + 0.0962, 0) / 1.0962) ** (1 / 0.4502)

@@ -265,6 +265,7 @@ def _through_air(
     known = isfinite(sum(constants)) and -100 < celsius < 100
     if not known or not (0 <= distance < 1e6 and 0 <= humidity <= 1):
         return 1.0
+    # Water in air in g/m³.
     water = humidity * exp(
         1.5587 + 6.939e-2 * celsius - 2.7816e-4 * celsius**2 + 6.8455e-7 * celsius**3
     )

@@ -12,12 +12,12 @@ from chipglow.io.cameras.cine import Cine
 from chipglow.io.cameras.flir import Flir, has_packed_counts
 from chipglow.io.cameras.hcc import Hcc
 from chipglow.io.cameras.ptw import Ptw
-from chipglow.io.cameras.stacks import Stated, read_stack
+from chipglow.io.cameras.stacks import Stated, read_stack, stack_times
 from chipglow.io.sandbox import Sandbox
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.file_names import files_of
 from chipglow.io.sources.source import head_of, reading
-from chipglow.quantities import of_other_packages
+from chipglow.quantities import Array, of_other_packages
 from chipglow.text import check_regular
 
 _HEAD: Final = 520
@@ -39,6 +39,8 @@ class CameraFormat:
     """Reads frames of a file that says what was measured: its path, which frames, and the time
     between frames in s, instead of the file's own, or None. Without it the file holds an array,
     and the user says."""
+    times: Callable[[Path, float | None], Array] | None = None
+    """Returns the times of all frames in s without reading them. Without it they are read."""
     in_subprocess: Callable[[Path], bool] = lambda path: False
     """Whether libraries in C or C++ would unpack a file: they do so in a subprocess."""
     inside_hdf5: bool = False
@@ -66,18 +68,22 @@ _OWN: Final[Mapping[str, CameraFormat]] = {
         (".jpg", ".jpeg", ".fff", ".seq", ".csq"),
         _starts(b"FFF\0", b"\xff\xd8\xff"),
         Flir.recording,
+        Flir.all_times,
         has_packed_counts,
     ),
     "ptw": CameraFormat(
-        "FLIR PTW (Cedip, Altair)", (".ptw",), _starts(b"CED", b"AIO"), Ptw.recording
+        "FLIR PTW (Cedip, Altair)", (".ptw",), _starts(b"CED", b"AIO"), Ptw.recording, Ptw.all_times
     ),
     "hcc": CameraFormat(
         "Telops HCC",
         (".hcc",),
         lambda head: head[:2] == b"TC" and len(head) > 3 and 5 <= head[3] < 32,
         Hcc.recording,
+        Hcc.all_times,
     ),
-    "cine": CameraFormat("Phantom CINE", (".cine",), _starts(b"CI\x2c\0"), Cine.recording),
+    "cine": CameraFormat(
+        "Phantom CINE", (".cine",), _starts(b"CI\x2c\0"), Cine.recording, Cine.all_times
+    ),
     "tiff": _array("TIFF, a stack or one file per frame", (".tif", ".tiff"), _starts(*_TIFF)),
     "png": _array("PNG, grey, one file per frame", (".png",), _starts(b"\x89PNG\r\n")),
     "npy": CameraFormat("NumPy array", (".npy",), _starts(b"\x93NUMPY")),
@@ -208,3 +214,29 @@ def read_here(path: Path, kind: str, frames: slice | None, stated: Stated) -> Re
         if one.read is not None:
             return one.read(path, frames, stated.interval)
         return read_stack(path, one.suffixes[0], frames, stated)
+
+
+def recording_times(path: Path, format: str | None = None, stated: Stated | None = None) -> Array:
+    """Return the times of all frames of a camera file in s; see `read_recording`."""
+    check_regular(path)
+    kind = format or find_format(path)
+    read = partial(_times_here, path, kind, stated or Stated())
+    return Sandbox(str(path)).answer(read) if camera_formats()[kind].in_subprocess(path) else read()
+
+
+def _times_here(path: Path, kind: str, stated: Stated) -> Array:
+    one = camera_formats()[kind]
+    with reading(path):
+        if one.times is not None:
+            return one.times(path, stated.interval)
+        if one.read is not None:
+            return one.read(path, None, stated.interval).times
+        return stack_times(path, one.suffixes[0], stated)
+
+
+def load_libraries() -> list[str]:
+    """Import the libraries of frequent formats, which takes seconds, and return their names."""
+    import h5py
+    import tifffile
+
+    return [h5py.__name__, tifffile.__name__]

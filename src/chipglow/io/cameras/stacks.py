@@ -132,6 +132,17 @@ def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> R
     )
 
 
+def stack_times(path: Path, kind: str, stated: Stated) -> NDArray[np.float64]:
+    """Return the times of all frames in s; see `read_stack`."""
+    with ExitStack() as stack:
+        arrays = with_lists(open_arrays(str(path), stack, ARRAY_READERS[kind]))
+        image = _Image(arrays, path, stated, Notes())
+        times = image.times(range(image.count))
+        if times is None:
+            raise MissingError(f"{image.array}: give the interval between frames")
+        return times
+
+
 class _Image:
     """Array of frames in a file, and its coordinates."""
 

@@ -413,6 +413,7 @@ def _by_position(image: ThermalImage, curve: Array, u: float) -> Array:
     down, right = (replace(image, temperature=slope).read(curve) for slope in slopes)
     behind, here, ahead = (image.read(curve + pitch * k * normals_of(curve)) for k in (-1, 0, 1))
     bend = (behind - 2 * here + ahead) / pitch**2
+    # Of a normal displacement d, the mean square of bend d² / 2 is 3/4 bend² u⁴.
     return np.asarray(np.sqrt((down**2 + right**2) * u**2 + 0.75 * bend**2 * u**4))
 
 

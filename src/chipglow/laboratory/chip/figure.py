@@ -177,7 +177,7 @@ def _draw_along(figure: FigureBase, axes: Axes, profile: "BandProfile") -> list[
     # Too many curves to name each: a colour bar shows their times.
     span = matplotlib.colors.Normalize(*(1e6 * profile.times[[0, -1]]))
     key = matplotlib.cm.ScalarMappable(span, _COLOURS)
-    figure.colorbar(key, ax=axes, label="time / µs", aspect=25)
+    figure.colorbar(key, ax=axes, label="time / µs", aspect=drawing.BAR_ASPECT)
     return [
         axes.plot([], [], color="black", linestyle=_LINES[s], label=s)[0]
         for s in Stage

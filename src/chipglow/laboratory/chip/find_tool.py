@@ -12,7 +12,7 @@ from scipy.special import ndtr
 
 from chipglow.camera import Measurement
 from chipglow.laboratory.chip.tool_position import ToolUncertainty
-from chipglow.quantities import Array
+from chipglow.quantities import TINY, Array
 from chipglow.scene import Raster, ToolGeometry
 from chipglow.text import Notes
 
@@ -186,6 +186,7 @@ def _best_line(image: Array, angles: Array) -> tuple[Array, float]:
     middle = float(np.median(scores))
     spread = float(np.median(np.abs(scores - middle)))
     best = float(scores.max())
+    # Scores are up to 1; less than this is rounding.
     prominence = (best - middle) / max(spread, 1e-12)
     if not prominence > _MIN_PROMINENCE:
         raise _not_found("nothing stands out from the noise")
@@ -221,7 +222,7 @@ def _gain(windows: Array, place: Array, blur: float, image: Array) -> Array:
     explained = (_residuals(windows, smooth) ** 2).sum(axis=-1)
     explained -= (_residuals(windows, basis) ** 2).sum(axis=-1)
     explained = np.sqrt(np.maximum(explained, 0.0) / steps.size)
-    return np.asarray(explained / (_level(windows, image) + 1e-300))
+    return np.asarray(explained / (_level(windows, image) + TINY))
 
 
 def _level(windows: Array, image: Array) -> Array:

@@ -24,7 +24,7 @@ from chipglow.laboratory.chip.frames import FRAMES, frame_mean, frame_scatter, l
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
 from chipglow.laboratory.comparison.coverage import COVERAGE
-from chipglow.quantities import ZERO_CELSIUS, Array, Brief, Parameter, Part, uncertainty_text
+from chipglow.quantities import SEED, ZERO_CELSIUS, Array, Brief, Parameter, Part, uncertainty_text
 from chipglow.quantities.units import LENGTH, TEMPERATURE_DIFFERENCE
 from chipglow.scene import Tool, sample
 from chipglow.text import Notes, result_html
@@ -44,9 +44,6 @@ AGREEING: Final = "values_with_E_n_up_to_1"
 
 _DRAWS: Final = 4000
 """Draws of the errors from which the probability of each simulation follows."""
-
-_SEED: Final = 2010
-"""Seed of the draws, so that the same files give the same numbers."""
 
 _FEWEST_VALUES: Final = 3
 """Fewest frames, and fewest places, that can be compared."""
@@ -501,7 +498,7 @@ def _confidences(measured: Estimate, simulated: Sequence[Estimate]) -> list[floa
     """Return the fraction of draws in which each set is best; NaN with one measured frame."""
     if FRAMES in measured.unevaluated:
         return [nan] * len(simulated)
-    generator = np.random.default_rng(_SEED)
+    generator = np.random.default_rng(SEED)
     base, *others = draw([measured, *simulated], _DRAWS, generator, heavy_tails=True)
     best = np.argmin([((other - base) ** 2).mean(axis=1) for other in others], axis=0)
     return [float((best == number).mean()) for number in range(len(others))]

@@ -1,6 +1,7 @@
 """Emissivity from images of heated objects, and true temperatures by it."""
 
 from chipglow.laboratory.emissivity.emissivity import (
+    LABORATORY as LABORATORY,
     EmissivityLine as EmissivityLine,
     EmissivityMap as EmissivityMap,
     Heating as Heating,
@@ -22,13 +23,16 @@ from chipglow.laboratory.emissivity.file import (
     surface_text as surface_text,
     write_emissivity as write_emissivity,
 )
+from chipglow.laboratory.emissivity.places import (
+    PlacesDescription as PlacesDescription,
+    RegionSection as RegionSection,
+    is_places as is_places,
+    load_places as load_places,
+    load_regions as load_regions,
+)
 from chipglow.laboratory.emissivity.region_emissivities import (
     RegionEmissivities as RegionEmissivities,
     determine_emissivities as determine_emissivities,
-)
-from chipglow.laboratory.emissivity.regions import (
-    RegionSection as RegionSection,
-    load_regions as load_regions,
 )
 from chipglow.laboratory.emissivity.temperature import (
     RegionTemperatures as RegionTemperatures,

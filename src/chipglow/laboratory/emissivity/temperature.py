@@ -28,9 +28,9 @@ from chipglow.laboratory.emissivity.observations import (
     used_pixels,
     with_observed,
 )
-from chipglow.quantities import ZERO_CELSIUS, Array, Brief
+from chipglow.quantities import SEED, ZERO_CELSIUS, Array, Brief
 from chipglow.quantities.units import HOTTEST
-from chipglow.radiometry import Band
+from chipglow.radiometry import Band, blackbody_radiance
 from chipglow.scene import Area, Region, areas
 from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Estimate, Limits, MonteCarlo, monte_carlo, propagate
@@ -53,9 +53,6 @@ solved."""
 
 _ITERATIONS: Final = 4
 """Iterations of temperature and the emissivity that depends on it."""
-
-_SEED: Final = 2010
-"""Seed of the draws, so that the same files give the same numbers."""
 
 _LIMITS: Final = (Limits("emissivity", 0.0, 1.0), Limits("radiance", 0.0), Limits("reflected", 0.0))
 
@@ -98,7 +95,7 @@ class TrueTemperature(Brief):
     @cached_property
     def distribution(self) -> MonteCarlo:
         """Distribution of the true temperature by the model itself (JCGM 101:2008)."""
-        generator = np.random.default_rng(_SEED)
+        generator = np.random.default_rng(SEED)
         return monte_carlo(self.model, *self.inputs, generator=generator, limits=_LIMITS)
 
 
@@ -248,7 +245,8 @@ def true_temperatures(
     places = areas(regions, measurements[0].raster)
     if isinstance(emissivities, EmissivityLine):
         emissivities = dict.fromkeys((area.name for area in places), emissivities)
-    known = {area: emissivities[area.name] for area in places if area.name in emissivities}
+    named = {area: emissivities.get(area.name, emissivities.get(area.feature)) for area in places}
+    known = {area: line for area, line in named.items() if line is not None}
     if not known:
         raise ValueError(
             f"emissivity: no region ({', '.join(area.name for area in places)}) has the name or "
@@ -362,8 +360,7 @@ def _mean_radiance(
 
 def _temperature(emissivity: ArrayLike, reflected: ArrayLike, band: Band, radiance: Array) -> Array:
     """Return the true temperature in K by apparent radiance in W/(m² sr): Equation 2."""
-    emissivity, room = np.asarray(emissivity), band.radiance(np.asarray(reflected))
-    own = (radiance - (1 - emissivity) * room) / emissivity
+    own = blackbody_radiance(radiance, emissivity, band.radiance(np.asarray(reflected)))
     return np.asarray(band.temperature(own), np.float64)
 
 

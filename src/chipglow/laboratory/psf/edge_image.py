@@ -14,7 +14,7 @@ from chipglow.camera import Flag, Measurement, Recording
 from chipglow.laboratory.psf.edge_line import EdgeLine, NoEdgeError, find_edge
 from chipglow.laboratory.psf.psf_fit import EdgePixels, ModelFit, fit_model
 from chipglow.laboratory.psf.psf_models import GaussianModel
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import TINY, Array, Brief
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 from chipglow.text import Notes
@@ -245,7 +245,7 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
         raise NoEdgeError(f"{image.name}: {error}") from None
     notes = Notes(warnings=[*image.notes.warnings, *warnings]).about(image.name)
     noise = float(np.std(pixels.radiance - quick.predicted(0, pixels)))
-    pixels = replace(pixels, sigma=np.full(pixels.x.size, max(noise, 1e-300)))
+    pixels = replace(pixels, sigma=np.full(pixels.x.size, max(noise, TINY)))
     # A Gaussian with a free step can put the edge of a clipped image far away.
     return (pixels if clipped else replace(pixels, line=quick.edges[0].line)), notes
 
@@ -254,7 +254,7 @@ def _pixels_of(image: EdgeImage, line: EdgeLine) -> EdgePixels:
     x, y, radiance = (values[image.usable] for values in (*image.places, image.radiance))
     if radiance.size < _FEWEST_PIXELS:
         raise NoEdgeError(f"{radiance.size} usable pixels, expected {_FEWEST_PIXELS} or more")
-    sigma = np.full(radiance.size, max(float(radiance.std()), 1e-300))
+    sigma = np.full(radiance.size, max(float(radiance.std()), TINY))
     return EdgePixels(x, y, radiance, sigma, image.pitch, image.footprint, line)
 
 

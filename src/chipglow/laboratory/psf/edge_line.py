@@ -99,6 +99,7 @@ def _best_step(
         after = np.where(enough, count - before, 1)
         gain = np.where(enough, mass**2 * count / (np.where(enough, before, 1) * after), 0.0)
         k = int(np.argmax(gain))
+        # A step without noise leaves the rounding of the sum.
         left = max(total - gain[k], 1e-12 * total) / (count - 2)
         if gain[k] / left > best[0]:
             normal = float(angle) + (pi if mass[k] > 0 else 0.0)

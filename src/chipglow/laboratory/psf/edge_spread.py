@@ -7,7 +7,7 @@ import xarray as xr
 
 from chipglow.laboratory.psf.psf_fit import EdgePixels, ModelFit
 from chipglow.laboratory.psf.psf_models import footprint_transfer
-from chipglow.quantities import Array
+from chipglow.quantities import TINY, Array
 
 BINS_PER_PITCH: Final = 4
 """Bins for each pixel pitch of an edge-spread function, as in ISO 12233."""
@@ -90,7 +90,7 @@ def _transfer(
     weight /= np.sinc(frequency * width)[:, None]
     value = model + weight @ residual[near]
     size = np.abs(value)
-    direction = np.where(size > 0, value / np.maximum(size, 1e-300), 1.0)
+    direction = np.where(size > 0, value / np.maximum(size, TINY), 1.0)
     # Only the part of the noise along the value changes its magnitude, to first order.
     along = (weight * np.conj(direction)[:, None]).real
     noise = along**2 @ uncertainty[near] ** 2

@@ -24,7 +24,7 @@ from chipglow.laboratory.psf.psf_models import (
     edge_response,
     is_length,
 )
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import TINY, Array, Brief
 
 _LEAST_TURN: Final = pi / 18
 """Smallest angle in rad between edges of different orientation."""
@@ -34,6 +34,15 @@ _START_WIDTHS: Final = (0.5, 1.0, 1.7, 3.0, 5.0, 9.0)
 
 _SLOPE_STEP: Final = 1e-5
 """Step of a shape parameter for its slope, in its scale."""
+
+_LEAST_SCALE: Final = 1e-30
+"""Least divisor of radiances and of squared residuals that are all the same."""
+
+_SINGULAR: Final = 1e-13
+"""Eigenvalues below this part of the largest are rounding: a parameter that nothing determines."""
+
+_TOLERANCE: Final = 1e-8
+"""Relative change of squares and parameters at which a fit ends: half of the digits."""
 
 _EDGE_PARAMETERS: Final = 4
 """Parameters of an edge: two brightnesses, its place and its turn."""
@@ -164,7 +173,7 @@ def fit_model(
     edges: Sequence[EdgePixels],
     apertures: ApertureSignals | None = None,
     start: ModelFit | None = None,
-    tolerance: float = 1e-8,
+    tolerance: float = _TOLERANCE,
     tries: int = 1,
 ) -> ModelFit:
     """Fit by weighted least squares with the edges' places, backgrounds and steps free."""
@@ -188,7 +197,7 @@ class _Problem:
         low, high = model.bounds(pitch, max(edge.reach for edge in edges))
         scales = [pitch if is_length(name) else 1.0 for name in model.parameters]
         for edge in edges:
-            contrast = max(float(np.ptp(edge.radiance)), 1e-300)
+            contrast = max(float(np.ptp(edge.radiance)), TINY)
             scales += [contrast, contrast, edge.pitch, edge.pitch / edge.reach]
             low, high = low + [-inf] * _EDGE_PARAMETERS, high + [inf] * _EDGE_PARAMETERS
         if apertures is not None:
@@ -197,7 +206,7 @@ class _Problem:
             # Else a small change between large apertures could be that of a huge source.
             low += [outside - 0.5 * contrast, 0.5 * contrast]
             high += [outside + 0.1 * contrast, 2.0 * contrast]
-            scales += [max(float(np.ptp(apertures.radiance)), 1e-30)] * 2
+            scales += [max(float(np.ptp(apertures.radiance)), _LEAST_SCALE)] * 2
         self.low, self.high, self.scales = np.array(low), np.array(high), np.array(scales)
 
     def least(self, vector: Array, tolerance: float) -> Array:
@@ -273,7 +282,7 @@ class _Problem:
         residual, jacobian = self.residual(vector), self.jacobian(vector)
         reduced = self._reduced_chi_squared(vector, residual)
         scaled = jacobian * self.scales
-        inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-13, hermitian=True)
+        inverse = np.linalg.pinv(scaled.T @ scaled, rcond=_SINGULAR, hermitian=True)
         inverse = inverse * np.outer(self.scales, self.scales)
         # Residuals beyond the noise count as more noise (Birge).
         noise = float(residual @ residual) / max(residual.size - vector.size, 1)
@@ -322,11 +331,12 @@ class _Problem:
         total, bins = 0.0, 0
         for edge, place, rows in zip(self.edges, self._split(vector)[1], self.rows, strict=True):
             part, distance = residual[rows], _line(place).distance(edge.x, edge.y)
+            # Bins of a quarter of a pitch, as of ISO 12233.
             index = np.floor((distance - distance.min()) / (edge.pitch / 4)).astype(np.int64)
             count = np.bincount(index)
             sums = np.bincount(index, part)
             there = count >= 2
-            variance = max(float(part.var()), 1e-30)
+            variance = max(float(part.var()), _LEAST_SCALE)
             total += float(np.sum(sums[there] ** 2 / count[there])) / variance
             bins += int(there.sum())
         return total / max(bins - vector.size, 1)
@@ -358,7 +368,7 @@ def _line(place: Sequence[float] | Array) -> EdgeLine:
 def with_noise(edge: EdgePixels, predicted: Array) -> EdgePixels:
     """Return the pixels with a noise whose variance is a line between those of the two sides."""
     span = float(np.ptp(predicted))
-    fraction = (predicted - predicted.min()) / max(span, 1e-300)
+    fraction = (predicted - predicted.min()) / max(span, TINY)
     square = (edge.radiance - predicted) ** 2
     sides = [fraction < 0.5, fraction >= 0.5]
     # The means of both sides, taken at the sides' own mean brightness.
@@ -370,7 +380,7 @@ def with_noise(edge: EdgePixels, predicted: Array) -> EdgePixels:
         slope = (means[1][1] - means[0][1]) / max(means[1][0] - means[0][0], 1e-3)
     variance = means[0][1] + slope * (fraction - means[0][0])
     # Each pixel has some noise: 2 % of the mean variance, or the rounding of 32-bit numbers.
-    least = max(0.02 * float(square.mean()), (1e-7 * span) ** 2, 1e-300)
+    least = max(0.02 * float(square.mean()), (1e-7 * span) ** 2, TINY)
     return replace(edge, sigma=np.sqrt(np.maximum(variance, least)))
 
 

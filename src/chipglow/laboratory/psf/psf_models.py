@@ -36,6 +36,12 @@ _MOST_SIDE: Final = 1025
 _LARGEST_WIDTH: Final = 1e-3
 """Largest width in m that is fitted."""
 
+_NARROWEST: Final = 0.02
+"""Smallest width over the pitch: the image would not change if it were narrower."""
+
+_SMALLEST_DISC: Final = 0.1
+"""Smallest diameter of a disc over the pitch, likewise."""
+
 _LENGTHS: Final = ("fwhm", "diameter")
 _EVEN_DISC: Final = 30.0
 """A disc of this many deviations of its blur is half as bright at its rim, within its 2000th."""
@@ -136,7 +142,7 @@ class GaussianModel(PSFModel):
 
     name = "gaussian"
     parameters = ("fwhm",)
-    shapes, lowest, highest = ((1.0,),), (0.02,), (inf,)
+    shapes, lowest, highest = ((1.0,),), (_NARROWEST,), (inf,)
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         return _gaussian_transfer(values[0], frequency)
@@ -159,8 +165,10 @@ class GaussianTailModel(PSFModel):
 
     name = "gaussian with tail"
     parameters = ("core_fwhm", "tail_fraction", "tail_ratio")
+    # A faint wide tail, or a strong short one.
     shapes = (0.9, 0.1, 4.0), (0.9, 0.25, 1.5)
-    lowest, highest = (0.02, 0.0, 0.72), (inf, 0.95, inf)
+    # A core remains; the ratio is as above.
+    lowest, highest = (_NARROWEST, 0.0, 0.72), (inf, 0.95, inf)
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
         low, high = super().bounds(pitch, extent)
@@ -228,8 +236,10 @@ class MoffatModel(PSFModel):
 
     name = "moffat"
     parameters = ("fwhm", "exponent")
+    # Wide wings, or nearly a Gaussian. With an exponent of 1 the light would be infinite, with 20
+    # it is that of a Gaussian but for the far wings.
     shapes = (1.0, 1.8), (1.0, 3.5)
-    lowest, highest = (0.02, 1.2), (inf, 20.0)
+    lowest, highest = (_NARROWEST, 1.2), (inf, 20.0)
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         cycles = 2 * pi * self._radius(values) * frequency
@@ -270,8 +280,9 @@ class DefocusedDiscModel(PSFModel):
 
     name = "defocused disc"
     parameters = ("disc_diameter", "blur_fwhm")
+    # Hardly and much blurred.
     shapes = (1.0, 0.2), (1.0, 0.6)
-    lowest, highest = (0.1, 0.02), (inf, inf)
+    lowest, highest = (_SMALLEST_DISC, _NARROWEST), (inf, inf)
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         disc = jinc(2 * pi * (values[0] / 2 * frequency))
@@ -293,8 +304,10 @@ class DefocusedRingModel(PSFModel):
 
     name = "defocused ring"
     parameters = ("disc_diameter", "blur_fwhm", "obscured_area")
+    # Hardly blurred with a small and a large obscuration, and much blurred.
     shapes = (1.0, 0.2, 0.2), (1.0, 0.2, 0.6), (1.0, 0.6, 0.2)
-    lowest, highest = (0.1, 0.02, 0.0), (inf, inf, 0.9)
+    # A ring of 10 % of the disc remains.
+    lowest, highest = (_SMALLEST_DISC, _NARROWEST, 0.0), (inf, inf, 0.9)
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         radius, area = values[0] / 2, values[2]
@@ -326,7 +339,8 @@ class EllipticalModel(PSFModel):
     """Whether its axes may be tilted against the image's; that needs three orientations."""
     name = "elliptical gaussian"
     shapes = ((1.0, 1.0, 0.0),)
-    lowest, highest = (0.02, 0.02, -0.99), (inf, inf, 0.99)
+    # The last is a correlation: at 1 the spread would be a line.
+    lowest, highest = (_NARROWEST, _NARROWEST, -0.99), (inf, inf, 0.99)
 
     @property
     def parameters(self) -> tuple[str, ...]:  # type: ignore[override]

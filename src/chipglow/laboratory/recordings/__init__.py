@@ -27,6 +27,10 @@ from chipglow.laboratory.recordings.description import (
     load_description as load_description,
     measurement_text as measurement_text,
 )
+from chipglow.laboratory.recordings.frames import (
+    CameraFrames as CameraFrames,
+    StoredFrames as StoredFrames,
+)
 from chipglow.laboratory.recordings.radiometric_calibration import (
     ImagePosition as ImagePosition,
     calibrate_recording as calibrate_recording,

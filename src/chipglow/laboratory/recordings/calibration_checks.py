@@ -6,13 +6,16 @@ from typing import Final
 import numpy as np
 from scipy.special import chdtrc, chdtri, stdtr, stdtrit
 
-from chipglow.quantities import ZERO_CELSIUS, Array
+from chipglow.quantities import TINY, ZERO_CELSIUS, Array
 
 _OUTLIER_LEVEL: Final = 0.01
 """Significance level of a total misfit and of an outlier."""
 
 _CORRELATION_LEVEL: Final = 0.05
 """Significance level of residuals that are not independent."""
+
+_LEAST_FREE: Final = 1e-9
+"""Least part of a point's residual that the fit leaves free; less is rounding."""
 
 _FAR_WITHIN: Final = 0.1
 """Mean squared residual, in the uncertainties, below which correlated residuals do no harm."""
@@ -88,11 +91,11 @@ def _outlier(residuals: Array, design: Array, stated: bool) -> int | None:
     Influence in Regression, 1982); its square is chi-squared's fall.
     """
     orthogonal = _orthonormal(design)
-    left = np.maximum(1 - np.sum(orthogonal**2, axis=1), 1e-9)
+    left = np.maximum(1 - np.sum(orthogonal**2, axis=1), _LEAST_FREE)
     total, fall = float(residuals @ residuals), residuals**2 / left
     point = int(np.argmax(fall))
     free = residuals.size - design.shape[1] - 1
-    rest = max(total - float(fall[point]), 1e-300)
+    rest = max(total - float(fall[point]), TINY)
     scatter = max(rest / free, 1.0) if stated else rest / free
     student = float(stdtrit(free, _OUTLIER_LEVEL / (2 * (free + 2)))) ** 2
     limit = float(chdtri(1, _OUTLIER_LEVEL / residuals.size)) if stated else student
@@ -111,7 +114,7 @@ def _serial_probability(residuals: Array, design: Array) -> float:
     draws -= (draws @ orthogonal) @ orthogonal.T
 
     def ratio(values: Array) -> Array:
-        squares = np.maximum(np.sum(values**2, axis=-1), 1e-300)
+        squares = np.maximum(np.sum(values**2, axis=-1), TINY)
         return np.asarray(np.sum(np.diff(values, axis=-1) ** 2, axis=-1) / squares)
 
     return float(np.mean(ratio(draws) <= ratio(residuals)))
@@ -130,7 +133,7 @@ def _drift_probability(residuals: Array, design: Array) -> float:
         return 1.0
     square = float(drift @ residuals) ** 2 / length
     free = residuals.size - design.shape[1] - 1
-    rest = max((float(residuals @ residuals) - square) / free, 1e-300)
+    rest = max((float(residuals @ residuals) - square) / free, TINY)
     return float(2 * stdtr(free, -np.sqrt(square / rest)))
 
 

@@ -22,7 +22,11 @@ PointRow = tuple[float, float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrationDescription(CalibrationSettings):
-    """A calibration of a camera's counts by blackbodies."""
+    """A calibration of a camera's counts by blackbodies.
+
+    The file names its parameters and has lists and limits with units; a `FittedCalibration` has
+    arrays and a `Band`.
+    """
 
     model: Annotated[
         Literal["linear", "sakuma-hattori"],

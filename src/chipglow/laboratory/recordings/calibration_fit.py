@@ -11,7 +11,7 @@ from scipy.special import chdtrc, ndtri, stdtrit
 
 from chipglow.camera.calibration import FittedCalibration
 from chipglow.laboratory.recordings.calibration_checks import alike, drift_shift, residual_warnings
-from chipglow.quantities import ZERO_CELSIUS, Array, Brief, Parameter, Part
+from chipglow.quantities import TINY, ZERO_CELSIUS, Array, Brief, Parameter, Part
 from chipglow.quantities.units import COLDEST, HOTTEST, TEMPERATURE
 from chipglow.radiometry import Band
 
@@ -115,7 +115,7 @@ class CalibrationFit(Generic[Kind], Brief):
         if points - estimated - 1 <= 0:
             return np.inf
         scatter = float(np.mean(self.residuals**2))
-        misfit = self.chi_squared if self.stated else points * np.log(max(scatter, 1e-300))
+        misfit = self.chi_squared if self.stated else points * np.log(max(scatter, TINY))
         return misfit + 2 * estimated * points / (points - estimated - 1)
 
     @property
@@ -275,6 +275,7 @@ def _least_squares(calibration: Kind, kelvins: Array, counts: Array, deviations:
     def jacobian(parameters: Array) -> Array:
         return (replace(calibration, parameters=parameters).gradient(kelvins) / deviations).T
 
+    # As exact as double precision allows, with a margin.
     exact = {"xtol": 1e-12, "ftol": 1e-12, "gtol": 1e-12}
     try:
         with np.errstate(over="raise", invalid="raise", divide="raise"):

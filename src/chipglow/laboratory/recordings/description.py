@@ -61,7 +61,7 @@ class ObjectSection(Part, overrides=ObjectParameters):
 
 @dataclass(frozen=True)
 class FlatFieldSection(Part):
-    """Frames of flat-field sources, such as a blackbody out of focus, by the same camera."""
+    """Files of flat-field sources, such as a blackbody out of focus; `FlatFields` has frames."""
 
     low: Annotated[
         FileBeside | None,
@@ -111,7 +111,11 @@ class CameraFile(Part):
 
 @dataclass(frozen=True)
 class MeasurementDescription(ImagePosition, RecordingSettings, Stated, CameraFile):
-    """A measurement from a camera file: contents, position, and conversion."""
+    """A measurement from a camera file: contents, position, and conversion.
+
+    Band, calibration and bad pixels are texts or names of files here; a `Measurement` has what is
+    read from them.
+    """
 
     band: Annotated[
         BandText | None,

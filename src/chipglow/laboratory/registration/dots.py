@@ -12,7 +12,7 @@ from scipy.special import erfc
 
 from chipglow.laboratory.registration.dot_matching import Arrangement, match_dots
 from chipglow.laboratory.registration.registration import Model, PointFit, Registration, fit_points
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import TINY, Array, Brief
 from chipglow.scene import Raster
 from chipglow.text import Notes
 
@@ -229,7 +229,7 @@ def _roundness(image: Array, blobs: Array) -> Array:
         xx, yy, xy = (
             gaussian_filter(image, size, order=order)[place] for order in ((0, 2), (2, 0), (1, 1))
         )
-        found[here] = (xx * yy - xy**2) / np.maximum(((xx + yy) / 2) ** 2, 1e-300)
+        found[here] = (xx * yy - xy**2) / np.maximum(((xx + yy) / 2) ** 2, TINY)
     return found
 
 
@@ -364,7 +364,7 @@ def _correlation(discs: list[_Disc]) -> float:
         float((d.residual * convolve(d.residual, kernel, mode="constant")).sum()) for d in discs
     )
     squares = sum(float((d.residual**2).sum()) for d in discs)
-    return float(np.sqrt(max(sums / max(squares, 1e-300), 1.0)))
+    return float(np.sqrt(max(sums / max(squares, TINY), 1.0)))
 
 
 def _systematic(found: Registration, raster: Raster) -> Array:

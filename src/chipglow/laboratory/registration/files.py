@@ -46,7 +46,7 @@ _HEAD: Final = """\
 
 
 class _Fields(TypedDict):
-    """Contents of the file."""
+    """Contents of the file: those of a `Registration`, which has arrays where YAML has lists."""
 
     model: Model
     method: Method

@@ -15,7 +15,7 @@ from scipy.special import stdtr
 
 from chipglow.camera import Flag, Measurement, Recording
 from chipglow.laboratory.registration.registration import Registration
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import TINY, Array, Brief
 from chipglow.text import Notes
 
 _FEWEST_FRAMES: Final = 6
@@ -31,6 +31,12 @@ standard deviations."""
 _CHANCE_LEVEL: Final = 0.01
 """Probability of such a correlation at one of the offsets, if the signals are unrelated, from which
 it is a warning."""
+
+_ROUNDING: Final = 1e-12
+"""Squares of correlations are rounded to this: a rest of 0 has no logarithm."""
+
+_CONSTANT: Final = 1e-9
+"""Standard deviation over the mean of a signal that is constant but for rounding."""
 
 _MOST_OFFSETS: Final = 2_000_000
 """Most offsets that are tried; limits memory and time."""
@@ -123,8 +129,7 @@ def _check(name: str, times: Array, values: Array) -> None:
         raise ValueError(f"{name} signal: {times.size} frames, expected {_FEWEST_FRAMES} or more")
     if not (np.isfinite(values).all() and (np.diff(times) > 0).all()):
         raise ValueError(f"{name} signal: expected finite values at ascending times")
-    # A billionth of the mean is rounding.
-    if not values.std() > 1e-9 * max(abs(values.mean()), 1e-300):
+    if not values.std() > _CONSTANT * max(abs(values.mean()), TINY):
         raise ValueError(f"{name} signal: does not change, expected an event that is seen in it")
 
 
@@ -172,7 +177,7 @@ def _correlation(target: Array, values: Array) -> Array:
     size = np.sqrt((one**2).sum(axis=1) * (other**2).sum(axis=1))
     enough = count[:, 0] >= max(_FEWEST_FRAMES, _LEAST_OVERLAP * target.size)
     product = (one * other).sum(axis=1)
-    return np.where(enough & (size > 0), product / np.maximum(size, 1e-300), 0.0)
+    return np.where(enough & (size > 0), product / np.maximum(size, TINY), 0.0)
 
 
 def _refined(times: Array, target: Array, spline: CubicSpline, begin: float) -> TimeAlignment:
@@ -196,6 +201,7 @@ def _refined(times: Array, target: Array, spline: CubicSpline, begin: float) -> 
 
 def _chance(correlation: float, freedom: float, offsets: int) -> Iterator[str]:
     """Yield a warning if one of the offsets would have this correlation by chance."""
+    # Rounding of a full correlation.
     rest = max(1.0 - correlation**2, 1e-15)
     likely = 2 * float(stdtr(freedom, -abs(correlation) * np.sqrt(freedom / rest))) * offsets
     if likely >= _CHANCE_LEVEL:
@@ -211,7 +217,7 @@ def _rivals(offsets: Array, correlations: Array, best: int, count: int) -> Itera
     others = squares.copy()
     others[(left[-1] if left.size else 0) : (best + right[0] if right.size else None)] = 0.0
     rival = int(others.argmax())
-    gain = count * log((1 - others[rival] + 1e-12) / (1 - squares[best] + 1e-12))
+    gain = count * log((1 - others[rival] + _ROUNDING) / (1 - squares[best] + _ROUNDING))
     if gain <= _RIVAL_GAIN and others[rival] > 0.0:
         yield (
             f"An offset of {(offsets[rival] - offsets[best]) * 1e6:.4g} us more fits nearly as "

@@ -54,6 +54,7 @@ _CLEARLY: Final = 0.1  # misfit of bands, by that of lines between them, that le
 _COVERAGE: Final = 2.5  # colours of one value differ by up to this multiple of their noise
 # D65, IEC 61966-2-1
 _WHITE: Final = np.array([[0.95047], [1.0], [1.08883]])
+# From linear sRGB to XYZ, IEC 61966-2-1.
 _TO_XYZ: Final = (
     np.array(
         [
@@ -66,9 +67,19 @@ _TO_XYZ: Final = (
 )
 
 
+FULL: Final = 255.0
+"""Level of a full channel of a picture, which has 8 bits."""
+
+
+def lab_of_bytes(colours: ArrayLike) -> NDArray[np.float64]:
+    """CIE L*a*b* of sRGB colours of 8 bits, shape (..., 3)."""
+    return lab(np.asarray(colours) / FULL)
+
+
 def lab(colours: ArrayLike) -> NDArray[np.float64]:
     """CIE L*a*b* (1976, D65) of sRGB colours of 0 to 1, shape (..., 3)."""
     srgb = np.asarray(colours, np.float64)
+    # IEC 61966-2-1, then CIE 15.
     linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
     xyz = linear @ _TO_XYZ.T
     small = xyz <= (6 / 29) ** 3
@@ -128,7 +139,7 @@ class ColourScale:
 
         Bands are counted if their number is 0; the noise is the standard deviation in L*a*b*.
         """
-        colours = pixels / 255.0
+        colours = pixels / FULL
         count = bands or _equal_bands(colours)
         if count:
             ends = pairwise(np.linspace(0, len(pixels), count + 1))
@@ -233,7 +244,7 @@ class ColourScale:
         keys = (red << 16) | (green << 8) | blue
         new = np.unique(keys[self._known[keys, 1] == 0.0])
         if new.size:
-            colours = np.stack([new >> 16, new >> 8 & 0xFF, new & 0xFF], axis=1) / 255.0
+            colours = np.stack([new >> 16, new >> 8 & 0xFF, new & 0xFF], axis=1) / FULL
             self._known[new] = _nearest(lab(colours), self.labs, self.knots, self.banded)
         return self._known[keys, 0], self._known[keys, 1] - np.float32(1.0)
 

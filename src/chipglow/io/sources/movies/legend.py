@@ -5,7 +5,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.movies.colour_scale import ColourScale, Picture, lab
+from chipglow.io.sources.movies.colour_scale import ColourScale, Picture, lab_of_bytes
 from chipglow.io.sources.movies.overlays import (
     MARK_TOLERANCE,
     Box,
@@ -76,7 +76,7 @@ def _uncertainty(
     if len(beyond) < _REACH:  # at the border of the picture nothing can be compared
         return _LEAST_UNCERTAINTY
     near = np.concatenate([beyond[:_REACH][::-1], inside[:_REACH]])
-    jumps = np.flatnonzero(np.linalg.norm(np.diff(lab(near / 255.0), axis=0), axis=1) > _EDGE)
+    jumps = np.flatnonzero(np.linalg.norm(np.diff(lab_of_bytes(near), axis=0), axis=1) > _EDGE)
     # An outline makes several jumps: the innermost is the legend's.
     offset = jumps[-1] + 1.0 - _REACH if jumps.size else _start_of_gradient(beyond, inside)
     if not abs(offset) <= _LARGEST_OFFSET:
@@ -114,9 +114,9 @@ def _start_of_gradient(beyond: NDArray[np.float64], inside: NDArray[np.float64])
 def explained(picture: Picture, box: Box, scale: ColourScale) -> float:
     """Return the fraction of a picture without legend and background in a scale's colours."""
     shown = ~(dark_lines(picture) | box_mask(picture.shape[:2], [box], _AROUND))
-    labs = lab(picture[shown][:: max(1, int(shown.sum()) // _MOST_PIXELS)] / 255.0)
+    labs = lab_of_bytes(picture[shown][:: max(1, int(shown.sum()) // _MOST_PIXELS)])
     for colour in plain_colours(picture):
-        labs = labs[np.linalg.norm(labs - lab(np.array(colour) / 255.0), axis=1) > MARK_TOLERANCE]
+        labs = labs[np.linalg.norm(labs - lab_of_bytes(colour), axis=1) > MARK_TOLERANCE]
     if not len(labs):
         return 0.0
     known = scale.labs
@@ -133,7 +133,7 @@ def legend_pixels(picture: Picture, box: Box) -> NDArray[np.uint8]:
 
 def legend_noise(picture: Picture, box: Box) -> float:
     """Return the standard deviation of colours of one value in a legend, in CIE L*a*b*."""
-    bar = lab(_bar(picture, box) / 255.0)
+    bar = lab_of_bytes(_bar(picture, box))
     apart = np.linalg.norm(bar - np.median(bar, axis=1, keepdims=True), axis=2)
     return float(np.sqrt((apart**2).mean()))
 
@@ -157,7 +157,7 @@ def _middle(bar: NDArray[Any]) -> NDArray[Any]:
 
 
 def _unblurred(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    steps = np.linalg.norm(np.diff(lab(colours / 255.0), axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(lab_of_bytes(colours), axis=0), axis=1)
     start = _after_jump(steps[:_BLUR])
     end = len(colours) - _after_jump(steps[::-1][:_BLUR])
     if end <= start:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import grey_closing, maximum_filter, minimum_filter
 
 from chipglow.io.nearest import fill
-from chipglow.io.sources.movies.colour_scale import ColourScale, Picture, lab
+from chipglow.io.sources.movies.colour_scale import ColourScale, Picture, lab_of_bytes
 from chipglow.io.sources.source import SourceError
 from chipglow.scene import FILLED, Material
 from chipglow.scene.regions import in_polygon
@@ -198,7 +198,7 @@ def find_background(
     for colour in plain_colours(picture):
         if place_of(scale, colour)[1] >= MARK_TOLERANCE:
             found.append(colour)
-        elif np.hypot(*lab(np.array(colour) / 255.0)[1:]) < _GREY:
+        elif np.hypot(*lab_of_bytes(colour)[1:]) < _GREY:
             refused.append(colour)
     return tuple(found), tuple(refused)
 
@@ -226,8 +226,8 @@ def plain_colours(picture: Picture) -> tuple[Colour, ...]:
 
 def _is_plain(pixels: NDArray[np.uint8], colour: Colour) -> bool:
     """Return whether pixels have one colour, or a range of greys."""
-    place = lab(np.array(colour) / 255.0)
-    apart = np.linalg.norm(lab(pixels / 255.0) - place, axis=1)
+    place = lab_of_bytes(colour)
+    apart = np.linalg.norm(lab_of_bytes(pixels) - place, axis=1)
     return bool(np.hypot(*place[1:]) < _GREY or np.sqrt((apart**2).mean()) < _ONE_COLOUR)
 
 
@@ -269,7 +269,7 @@ def _border(picture: NDArray[Any]) -> NDArray[Any]:
 
 
 def _like(picture: Picture, colour: Colour) -> NDArray[np.bool_]:
-    apart = lab(picture / 255.0) - lab(np.array(colour) / 255.0)
+    apart = lab_of_bytes(picture) - lab_of_bytes(colour)
     return np.asarray(np.linalg.norm(apart, axis=-1) < MARK_TOLERANCE)
 
 

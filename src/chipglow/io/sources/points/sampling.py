@@ -15,7 +15,7 @@ import scipy
 from numba import njit
 from numpy.typing import NDArray
 
-from chipglow.quantities import Brief
+from chipglow.quantities import TINY, Brief
 from chipglow.scene.frame import Material
 from chipglow.scene.raster import Raster
 
@@ -182,7 +182,7 @@ def _coarseness(neighbours: NDArray[np.int32], nearest: NDArray[np.float64]) -> 
     a lattice, 0.52 for points at random.
     """
     around = nearest[neighbours]
-    mean = np.maximum(around.mean(axis=1), 1e-300)
+    mean = np.maximum(around.mean(axis=1), TINY)
     disorder = (around.std(axis=1) / mean)[neighbours].mean(axis=1)
     wider: NDArray[np.float64] = np.interp(disorder, (_ORDER, _DISORDER), (1.0, _COARSEST))
     return wider

@@ -1,0 +1,115 @@
+"""The page that asks for the settings of a file: its fields are those of the description."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import panel as pn
+from bokeh.document import Document
+
+from chipglow.app.asking import CONTENTS, FIRST, Content, Setting, settings_of
+from chipglow.app.opening import Asking, OpenFiles
+from chipglow.app.session import Newest
+from chipglow.quantities.format import readable
+
+_WIDTH: Final = 330
+"""Width of a field in pixels: one of them fits a telephone."""
+
+_STYLE: Final = """
+:host { font: 14px/1.4 system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
+"""
+_INTRODUCTION: Final = (
+    "The file states too little. Give the settings as for the command line; they are saved beside "
+    "it as {}.yaml. Other files are named by their path on this computer."
+)
+
+_ERROR_STYLE: Final = f"{_STYLE} :host {{ color: #b3261e; }}"
+
+
+class AskingPage:
+    """The page of a file that lacks settings; afterwards the browser opens the file's own page."""
+
+    def __init__(self, asking: Asking, key: str, files: OpenFiles) -> None:
+        self._key, self._files = key, files
+        self._document: Document | None = None
+        self._work = Newest(self._open, self._notified)
+        self._fields: dict[Content, dict[str, pn.widgets.TextInput]] = {}
+        options = {CONTENTS[one]: one for one in asking.contents}
+        self._content = pn.widgets.Select(
+            name="Content of the file", options=options, width=_WIDTH, visible=len(options) > 1
+        )
+        self._said = pn.pane.Markdown("", stylesheets=[_ERROR_STYLE], sizing_mode="stretch_width")
+        self._button = pn.widgets.Button(name="Open", button_type="primary", width=_WIDTH)
+        self._button.on_click(self._clicked)
+        self._content.param.watch(lambda _: self._choose(), "value")
+        # The browser loads the file's page when this text changes.
+        self._done = pn.widgets.TextInput(visible=False)
+        self._done.jscallback(value="window.location.search = cb_obj.value")
+        self._asked = pn.Column(sizing_mode="stretch_width")
+        title = f"## {asking.name}\n\n{_INTRODUCTION.format(asking.name)}"
+        self.page = pn.Column(
+            pn.pane.Markdown(title, stylesheets=[_STYLE], sizing_mode="stretch_width"),
+            self._content,
+            self._said,
+            self._asked,
+            self._button,
+            self._done,
+            sizing_mode="stretch_width",
+            styles={"max-width": "1100px", "margin": "0 auto", "padding": "8px"},
+        )
+        self._choose(asking.settings)
+        self._say(asking.error)
+
+    def start(self, document: Document | None) -> None:
+        """Set the document in which the results of another thread are shown."""
+        self._document = document
+
+    def _choose(self, texts: Mapping[str, str] | None = None) -> None:
+        """Show the fields of the chosen content."""
+        content: Content = self._content.value
+        settings = settings_of(content)
+        made = {path: _field(one, (texts or {}).get(path, "")) for path, one in settings.items()}
+        self._fields[content] = made
+        first = [made[path] for path in FIRST[content]]
+        rest = [field for path, field in made.items() if path not in FIRST[content]]
+        card = pn.Card(
+            pn.FlexBox(*rest), title="All settings", collapsed=True, sizing_mode="stretch_width"
+        )
+        self._asked[:] = [pn.FlexBox(*first), card]
+
+    def _clicked(self, _: Any) -> None:
+        content: Content = self._content.value
+        texts = {path: field.value_input for path, field in self._fields[content].items()}
+        given = {path: text.strip() for path, text in texts.items() if text.strip()}
+        self._button.loading = True
+        self._work.ask((content, given))
+
+    def _open(self, answer: tuple[Content, dict[str, str]]) -> None:
+        opened = self._files.answer(self._key, *answer)
+        error = opened.error if isinstance(opened, Asking) else ""
+        self._notified("failed" if error else "opened", error)
+
+    def _notified(self, kind: str, text: str) -> None:
+        def show() -> None:
+            self._button.loading = False
+            if kind == "failed":
+                self._say(text)
+            else:
+                self._done.value = f"?open={self._key}" if self._key else "?"
+
+        if self._document is not None:
+            self._document.add_next_tick_callback(show)
+
+    def _say(self, error: str) -> None:
+        lines = [f"- {part}" for part in readable(error).split("; ")] if error else []
+        self._said.object = "\n".join(lines)
+        self._said.visible = bool(lines)
+
+
+def _field(setting: Setting, text: str) -> pn.widgets.TextInput:
+    return pn.widgets.TextInput(
+        name=setting.path,
+        value=text,
+        placeholder=setting.allowed.removeprefix("none, ").removeprefix("or "),
+        description=setting.parameter.meaning,
+        width=_WIDTH,
+    )

@@ -1,0 +1,531 @@
+"""The panel in which places are drawn on the images and read: table, curves and files."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from importlib.util import find_spec
+from io import BytesIO
+from math import isfinite, nan
+from typing import Any, Final, get_args
+
+import numpy as np
+import pandas as pd
+import panel as pn
+from bokeh.models import (
+    ColumnDataSource,
+    HoverTool,
+    LinearColorMapper,
+    NumberFormatter,
+    Span,
+    StringFormatter,
+)
+from bokeh.palettes import Cividis256, Greys256, Inferno256, Turbo256, Viridis256
+from bokeh.plotting import figure
+
+from chipglow.app.export import csv_file, picture_file, workbook
+from chipglow.app.figures import MICRONS, TEXT
+from chipglow.app.marks import Kind, Mark, marks_of, new_name, places_text
+from chipglow.app.opened import Opened
+from chipglow.app.pictures import SceneFrames
+from chipglow.app.reading import MEASURED, Reader, table_of
+from chipglow.app.session import PAUSE, Newest
+from chipglow.app.tools import DrawnPlaces, colour_of
+from chipglow.laboratory.emissivity import PlacesDescription
+from chipglow.laboratory.emissivity.places import ImageView, KnownEmissivity, Palette
+from chipglow.laboratory.readings import PlaceCurves
+from chipglow.quantities import ZERO_CELSIUS
+from chipglow.quantities.units import TEMPERATURE
+from chipglow.scene.regions import Point
+
+_COLOURS: Final[Mapping[str, Any]] = {
+    "inferno": Inferno256,
+    "viridis": Viridis256,
+    "cividis": Cividis256,
+    "grey": Greys256,
+    "turbo": Turbo256,
+}
+_LABELS: Final = {name: name.capitalize() for name in get_args(Palette)} | {
+    "turbo": "Turbo (not colour-blind safe)"
+}
+
+_COLUMNS: Final = {
+    "place": "Place",
+    "pixels": "Pixels",
+    "mean_degC": "Mean / °C",
+    "standard_deviation_K": "SD / K",
+    "minimum_degC": "Min / °C",
+    "maximum_degC": "Max / °C",
+    "out_of_range": "Out of range",
+    "emissivity": "Emissivity",
+    "uncertainty": "its u",
+    "true_temperature_degC": "True / °C",
+    "expanded_uncertainty_K": "U (95 %) / K",
+}
+"""Columns of the table on the page with their titles."""
+
+_HINTS: Final[Mapping[str, str]] = {
+    "look": "Choose a shape above the images and draw it.",
+    "point": "Point: click on an image.",
+    "line": "Line: drag from end to end.",
+    "box": "Box: drag from corner to corner.",
+    "circle": "Circle: drag from the centre to the rim.",
+    "polygon": "Polygon: click each corner, then press Enter; on a touch screen hold the last one.",
+    "edit": "Edit: drag a handle, or click it and press Backspace to remove its place.",
+}
+
+_GRID: Final = {
+    "display": "grid",
+    "grid-template-columns": "repeat(auto-fit, minmax(280px, 1fr))",
+    "width": "100%",
+}
+"""Figures side by side, as many as fit."""
+
+_TABLE_STYLE: Final = """
+.tabulator, .tabulator .tabulator-header, .tabulator .tabulator-header .tabulator-col,
+.tabulator .tabulator-tableholder .tabulator-table,
+.tabulator-row, .tabulator-row.tabulator-row-even
+{ background: transparent !important; color: inherit !important; }
+.tabulator-row.tabulator-selected
+{ background: color-mix(in srgb, currentColor 15%, transparent) !important; }
+"""
+"""The colours of the page, on light and on dark ground."""
+
+_LINE_HEIGHT: Final = 190
+"""Height of the curves in pixels."""
+
+
+class Measuring:
+    """Places on the images of a page, and what they measure.
+
+    `later` calls a function in the thread of the page, and `say` shows a text of a kind.
+    """
+
+    def __init__(
+        self, opened: Opened, later: Callable[[Callable[[], None]], None], say: Callable[..., None]
+    ) -> None:
+        self._opened, self._later, self._say = opened, later, say
+        self._marks: list[Mark] = []
+        self._view = ImageView()
+        self._reader = Reader(opened)
+        self._curves: PlaceCurves | None = None
+        self._table, self._counted = pd.DataFrame(), pd.DataFrame()
+        self._profiles: dict[str, pd.DataFrame] = {}
+        self._drawn = DrawnPlaces(
+            opened.figures, self._add, self._move, self._remove, self._hint_at
+        )
+        self._work = Newest(self._read_curves, self._failed)
+        self._build()
+        opened.watch(self._show_picture)
+
+    def set_theme(self, theme: str) -> None:
+        """Set the colours of the curves' text."""
+        for one in self._figures:
+            one.title.text_color = TEXT[theme]
+            one.axis.axis_label_text_color = one.axis.major_label_text_color = TEXT[theme]
+            one.axis.axis_line_color = one.axis.major_tick_line_color = TEXT[theme]
+
+    def restore(self, described: PlacesDescription) -> None:
+        """Show the places and the view of a file; ValueError for a place outside the image."""
+        self._marks = list(marks_of(described, self._opened.frames.raster))
+        view = described.view
+        for widget, kelvins in (
+            (self._low, view.low),
+            (self._high, view.high),
+            (self._isotherm, view.isotherm),
+        ):
+            widget.value = None if kelvins is None else round(kelvins - ZERO_CELSIUS, 6)
+        self._palette.value = view.palette
+
+    def end(self) -> None:
+        """Stop reading for a page that was closed."""
+        self._work.cancel()
+
+    def _hint_at(self, tool: str) -> None:
+        self._hint.object = _HINTS[tool]
+
+    # Places
+
+    def _add(self, kind: Kind, points: tuple[Point, ...]) -> None:
+        self._change(lambda: self._marks.append(self._new(kind, points)))
+
+    def _new(self, kind: Kind, points: tuple[Point, ...]) -> Mark:
+        return Mark(new_name(kind, self._marks), kind, points).within(self._reader.raster)
+
+    def _move(self, number: int, handle: int, to: Point) -> None:
+        def move() -> None:
+            self._marks[number] = self._marks[number].moved(handle, to, self._reader.raster)
+
+        self._change(move)
+
+    def _remove(self, number: int) -> None:
+        self._change(lambda: self._marks.pop(number))
+
+    def _change(self, act: Callable[[], Any]) -> None:
+        """Change the places, and show and read them; what is not possible is said."""
+
+        def change() -> None:
+            try:
+                act()
+            except ValueError as error:
+                self._say(str(error), "error")
+            self._show_places()
+
+        self._later(change)  # together: the browser draws once
+
+    def _on_edit(self, event: Any) -> None:
+        def edit() -> None:
+            self._marks[event.row] = self._edited(event.row, event.column, event.value)
+
+        self._change(edit)
+
+    def _edited(self, number: int, column: str, value: Any) -> Mark:
+        """Return a place with a new name or emissivity; ValueError if it is not possible."""
+        mark = self._marks[number]
+        if column == "place":
+            name = str(value or "").strip()
+            others = [one.name for one in self._marks if one is not mark]
+            if not name or name in others:
+                raise ValueError(f"place: {name!r}, expected a name that no other place has")
+            return replace(mark, name=name)
+        number_given = value is not None and value != "" and isfinite(float(value))
+        known = mark.emissivity
+        if column == "emissivity":
+            if not number_given:
+                return replace(mark, emissivity=None)
+            uncertainty = known.uncertainty if known else 0.0
+            return replace(mark, emissivity=KnownEmissivity(float(value), uncertainty))
+        if known is None:
+            raise ValueError("its u: give the emissivity of the place first")
+        uncertainty = float(value) if number_given else 0.0
+        return replace(mark, emissivity=KnownEmissivity(known.mean, uncertainty))
+
+    # Readings
+
+    def _show_picture(self) -> None:
+        """Show the colours of a new picture, and read all places in it."""
+        self._reader.forget()
+        self._show_view()
+        self._show_places()
+
+    def _show_places(self) -> None:
+        """Show all places, and what they measure."""
+        if not self._reader.is_ready:
+            return
+        self._drawn.show(self._marks)
+        self._show_table()
+        self._show_lines()
+        self._show_histogram()
+        self._ask_curves()
+
+    def _show_table(self) -> None:
+        readings = [self._reader.read(mark) for mark in self._marks]
+        self._table = table_of(readings)
+        rows = self._table.reindex(columns=[*_COLUMNS]).assign(
+            emissivity=[mark.emissivity.mean if mark.emissivity else nan for mark in self._marks],
+            uncertainty=[
+                mark.emissivity.uncertainty if mark.emissivity else nan for mark in self._marks
+            ],
+        )
+        self._rows.value = rows
+        self._rows.visible = bool(self._marks)
+        self._copied.data = {"text": [self._table.to_csv(sep="\t", index=False)]}
+        warnings = [warning for one in readings for warning in one.notes.warnings]
+        self._warnings.object = "\n\n".join(warnings)
+        self._warnings.visible = bool(warnings)
+
+    def _show_lines(self) -> None:
+        lines = [(number, one) for number, one in enumerate(self._marks) if one.kind == "line"]
+        profiles = [self._reader.profile(mark) for _, mark in lines]
+        self._along.data = {
+            "xs": [(MICRONS * one.distance).tolist() for one in profiles],
+            "ys": [(one.kelvins - ZERO_CELSIUS).tolist() for one in profiles],
+            "colour": [colour_of(number) for number, _ in lines],
+            "name": [mark.name for _, mark in lines],
+        }
+        self._profiles = {one.place: one.to_frame() for one in profiles}
+
+    def _show_histogram(self) -> None:
+        """Show the frequency of temperatures in the selected place, by default the last region."""
+        areas = [number for number, mark in enumerate(self._marks) if mark.region.has_area]
+        chosen = [number for number in self._rows.selection if number < len(self._marks)]
+        number = (chosen or areas[-1:] or [None])[0]
+        if number is None:
+            self._bins.data = {"left": [], "right": [], "top": []}
+            self._counted = pd.DataFrame()
+            return
+        found = self._reader.histogram(self._marks[number])
+        celsius = found.edges - ZERO_CELSIUS
+        self._bins.data = {
+            "left": celsius[:-1].tolist(),
+            "right": celsius[1:].tolist(),
+            "top": found.pixels.tolist(),
+        }
+        self._frequency.title.text = f"Frequency: {found.place}"
+        self._bars.glyph.fill_color = colour_of(number)
+        self._counted = found.to_frame()
+
+    def _ask_curves(self) -> None:
+        """Read the frames of a recording; those of a scene, which take long, when asked for."""
+        frames = self._opened.frames
+        self._now.location = float(MICRONS * frames.times[self._opened.frame])
+        is_scene, several = isinstance(frames, SceneFrames), len(frames.times) > 1
+        self._compute.visible = is_scene and several and bool(self._marks)
+        if several and self._marks and not is_scene:
+            self._work.ask(tuple(self._marks))
+        else:
+            self._work.cancel()
+            self._show_curves(None, ())
+
+    def _read_curves(self, marks: tuple[Mark, ...]) -> None:
+        """Read places in all frames, in a thread of its own."""
+        self._work.pause(PAUSE)
+        curves = self._reader.curves(marks, self._check_frame)
+        self._later(lambda: self._show_curves(curves, marks))
+
+    def _check_frame(self, done: float) -> None:
+        """Stop reading frames that are no longer needed, and say how many of a scene are read."""
+        self._work.check()
+        if isinstance(self._opened.frames, SceneFrames):
+            text, kind = ("Frames are measured.", "busy") if done < 1 else ("", "")
+            progress = {"progress": done} if done < 1 else {}
+            self._later(lambda: self._say(text, kind, **progress))
+
+    def _show_curves(self, curves: PlaceCurves | None, marks: tuple[Mark, ...]) -> None:
+        self._curves = curves
+        means = [] if curves is None else list(curves.mean - ZERO_CELSIUS)
+        micros = [] if curves is None else (MICRONS * curves.times).tolist()
+        self._over_time.data = {
+            "xs": [micros] * len(means),
+            "ys": [mean.tolist() for mean in means],
+            "colour": [colour_of(number) for number, _ in enumerate(means)],
+            "name": [mark.name for mark in marks],
+        }
+
+    def _failed(self, _kind: str, text: str) -> None:
+        self._later(lambda: self._say(text, "error"))
+
+    # View
+
+    def _on_view(self) -> None:
+        def kelvins(widget: Any) -> float | None:
+            return None if widget.value is None else widget.value + ZERO_CELSIUS
+
+        try:
+            self._view = ImageView(
+                frame=self._opened.frame,
+                low=kelvins(self._low),
+                high=kelvins(self._high),
+                palette=self._palette.value,
+                isotherm=kelvins(self._isotherm),
+            )
+        except ValueError as error:
+            self._say(str(error).removeprefix("ImageView."), "error")
+            return
+        if self._reader.is_ready:
+            self._show_view()
+
+    def _show_view(self) -> None:
+        """Set colours and limits of the images of temperatures, and the isotherm."""
+        low, high = self._limits()
+        for name, image in self._opened.images.items():
+            if image.is_temperature:
+                _mapper(self._opened.figures[name]).update(
+                    palette=_COLOURS[self._view.palette], low=low, high=high
+                )
+        level = self._view.isotherm
+        lines = [] if level is None else self._reader.isotherm(level)
+        self._drawn.isotherm.data = {
+            "xs": [(MICRONS * line[:, 0]).tolist() for line in lines],
+            "ys": [(MICRONS * line[:, 1]).tolist() for line in lines],
+        }
+
+    def _limits(self) -> tuple[float, float]:
+        """Return the ends of the colours in °C: those that are given, else of the images."""
+        values = [
+            one.values[np.isfinite(one.values)]
+            for one in self._opened.images.values()
+            if one.is_temperature
+        ]
+        known = np.concatenate(values) if values else np.zeros(0)
+        low, high = (known.min(), known.max()) if known.size else (ZERO_CELSIUS, ZERO_CELSIUS + 1)
+        low = self._view.low if self._view.low is not None else low
+        high = self._view.high if self._view.high is not None else high
+        return float(low) - ZERO_CELSIUS, max(float(high), float(low) + 1e-3) - ZERO_CELSIUS
+
+    # Files
+
+    def _tables(self) -> dict[str, pd.DataFrame]:
+        tables = {"places": self._table}
+        if self._curves is not None:
+            tables["over time"] = self._curves.to_frame()
+        if self._profiles:
+            tables["along lines"] = pd.concat(self._profiles.values(), ignore_index=True)
+        if not self._counted.empty:
+            tables["histogram"] = self._counted
+        return tables
+
+    def _settings(self) -> dict[str, str]:
+        low, high = self._limits()
+        return {
+            "File": self._opened.name,
+            "Frame": str(self._opened.frame),
+            "Time": f"{MICRONS * self._opened.frames.times[self._opened.frame]:.9g} µs",
+            "Image": self._opened.images[MEASURED].title,
+            "Colours": f"{low:.6g} °C to {high:.6g} °C, {self._view.palette}",
+            "Session": self._session_text(),
+        }
+
+    def _session_text(self) -> str:
+        view: dict[str, Any] = {"frame": self._opened.frame, "palette": self._view.palette}
+        for name in ("low", "high", "isotherm"):
+            if (kelvins := getattr(self._view, name)) is not None:
+                view[name] = TEMPERATURE.text(round(kelvins, 6))
+        return places_text(self._marks, self._opened.source, self._opened.reflected, view)
+
+    def _picture(self) -> bytes:
+        celsius = self._reader.kelvins - ZERO_CELSIUS
+        title = f"{self._opened.images[MEASURED].title} / °C"
+        return picture_file(
+            celsius, self._reader.raster, title, self._marks, self._view, self._limits(),
+            self._settings(),
+        )  # fmt: skip
+
+    # Widgets
+
+    def _build(self) -> None:
+        """Make the widgets and figures of the panel."""
+        self._rows = _table_widget()
+        # Panel calls these without the lock of the document, which changes of it need.
+        self._rows.on_edit(self._on_edit)
+        self._rows.on_click(lambda event: self._remove(event.row), column="delete")
+        self._rows.param.watch(lambda _: self._later(self._show_histogram), "selection")
+        self._hint = pn.pane.HTML(_HINTS["look"], margin=2)
+        self._warnings = pn.pane.Markdown("", visible=False)
+        self._low = _number("Colours from / °C")
+        self._high = _number("to / °C")
+        self._isotherm = _number("Isotherm / °C")
+        options = {label: name for name, label in _LABELS.items()}
+        self._palette = pn.widgets.Select(
+            label="Palette", options=options, value=self._view.palette, width=130
+        )
+        for widget in (self._low, self._high, self._isotherm, self._palette):
+            widget.param.watch(lambda _: self._later(self._on_view), "value")
+        self._compute = pn.widgets.Button(label="Measure all frames", visible=False, width=150)
+        self._compute.on_click(lambda _: self._work.ask(tuple(self._marks)))
+        self._copied = ColumnDataSource({"text": [""]})
+        self._build_figures()
+        self.tools = pn.pane.Bokeh(self._drawn.choice, margin=0)
+        self.panel = pn.Column(
+            self._hint,
+            self._rows,
+            self._warnings,
+            self._compute,
+            pn.Column(*(_pane(one) for one in self._figures), styles=_GRID),
+            pn.FlexBox(self._low, self._high, self._palette, self._isotherm),
+            pn.FlexBox(*self._buttons()),
+            sizing_mode="stretch_width",
+        )
+
+    def _build_figures(self) -> None:
+        empty: dict[str, list[Any]] = {"xs": [], "ys": [], "colour": [], "name": []}
+        self._over_time = ColumnDataSource(empty, name="over_time")
+        self._along = ColumnDataSource(empty, name="along_lines")
+        self._bins = ColumnDataSource({"left": [], "right": [], "top": []}, name="histogram")
+        time = _curves("Over time", "time / µs", self._over_time)
+        along = _curves("Along lines", "distance / µm", self._along)
+        self._now = Span(dimension="height", line_color="#7d858f", line_dash="dotted", location=0)
+        time.add_layout(self._now)
+        self._frequency = _plot("Frequency", "temperature / °C", "pixels")
+        self._bars = self._frequency.quad(
+            "left", "right", "top", 0, source=self._bins, line_color=None
+        )
+        self._figures = (time, along, self._frequency)
+
+    def _buttons(self) -> list[Any]:
+        copy = pn.widgets.Button(label="Copy table", width=110)
+        copy.js_on_click(
+            args={"source": self._copied}, code="navigator.clipboard.writeText(source.data.text[0])"
+        )
+        excel = _download(
+            "Excel", "chipglow.xlsx", lambda: workbook(self._tables(), self._settings())
+        )
+        if find_spec("openpyxl") is None:
+            excel.disabled, excel.label = True, "Excel: needs openpyxl"
+        return [
+            copy,
+            _download("Table, CSV", "places.csv", lambda: csv_file(self._table)),
+            _download("Curves, CSV", "curves.csv", self._curves_file),
+            excel,
+            _download("Picture, PNG", "chipglow.png", self._picture),
+            _download("Session, YAML", "session.yaml", lambda: self._session_text().encode()),
+        ]
+
+    def _curves_file(self) -> bytes:
+        tables = {name: one for name, one in self._tables().items() if name != "places"}
+        return b"\r\n".join(f"{name}\r\n".encode() + csv_file(one) for name, one in tables.items())
+
+
+def _mapper(one: Any) -> LinearColorMapper:
+    """Return the colours of the image of a figure."""
+    return one.select_one(LinearColorMapper)
+
+
+def _number(name: str, value: float | None = None) -> Any:
+    return pn.widgets.FloatInput(label=name, value=value, width=110)
+
+
+def _table_widget() -> Any:
+    def digits(pattern: str) -> NumberFormatter:
+        return NumberFormatter(format=pattern, nan_format="–", text_align="right")
+
+    formats = dict.fromkeys(_COLUMNS, digits("0.0"))
+    formats |= {"place": StringFormatter(), "pixels": digits("0"), "out_of_range": digits("0.0 %")}
+    formats |= {"emissivity": digits("0.000"), "uncertainty": digits("0.000")}
+    formats |= {"expanded_uncertainty_K": digits("0.00"), "standard_deviation_K": digits("0.00")}
+    number = {"type": "number", "step": 0.01}
+    editors: dict[str, Any] = dict.fromkeys(_COLUMNS)
+    editors |= {"place": {"type": "input"}, "emissivity": number, "uncertainty": number}
+    return pn.widgets.Tabulator(
+        pd.DataFrame(columns=[*_COLUMNS]),
+        titles=dict(_COLUMNS),
+        formatters=formats,
+        editors=editors,
+        buttons={"delete": "✕"},
+        show_index=False,
+        selectable=1,
+        sortable=False,
+        layout="fit_data_table",
+        theme="simple",
+        stylesheets=[_TABLE_STYLE],
+        visible=False,
+        sizing_mode="stretch_width",
+    )
+
+
+def _plot(title: str, x: str, y: str) -> Any:
+    one = figure(
+        title=title, height=_LINE_HEIGHT, sizing_mode="stretch_width", tools="",
+        toolbar_location=None, background_fill_color=None, border_fill_color=None,
+        outline_line_color="#80808059", min_border=4,
+    )  # fmt: skip
+    one.grid.grid_line_color = "#80808059"
+    one.axis.minor_tick_line_color = None
+    one.xaxis.axis_label, one.yaxis.axis_label = x, y
+    return one
+
+
+def _curves(title: str, x: str, source: ColumnDataSource) -> Any:
+    one = _plot(title, x, "temperature / °C")
+    drawn = one.multi_line("xs", "ys", source=source, line_color="colour", line_width=2)
+    tips = [("", "@name"), (x.split(" ")[0], "$x{0.0}"), ("°C", "$y{0.0}")]
+    one.add_tools(HoverTool(renderers=[drawn], tooltips=tips, line_policy="nearest"))
+    return one
+
+
+def _pane(one: Any) -> Any:
+    return pn.pane.Bokeh(one, sizing_mode="stretch_width", margin=2)
+
+
+def _download(label: str, filename: str, make: Callable[[], bytes]) -> Any:
+    return pn.widgets.FileDownload(
+        callback=lambda: BytesIO(make()), filename=filename, label=label, width=130,
+    )  # fmt: skip

@@ -1,0 +1,93 @@
+"""The open file of a page: its frames, and the images that the figures show."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from chipglow.app.pictures import Corrected, Panel, Picture
+from chipglow.camera import Measurement
+from chipglow.quantities import ZERO_CELSIUS, Array, Brief
+from chipglow.scene import Raster
+from chipglow.text import Notes
+
+
+class Frames(Protocol):
+    """Frames of radiance temperature, each read or computed when it is asked for."""
+
+    @property
+    def times(self) -> Array:
+        """Start of each frame in s."""
+        ...
+
+    @property
+    def raster(self) -> Raster:
+        """Grid of the pixels."""
+        ...
+
+    def kelvins(self, index: int) -> Array:
+        """Return the radiance temperature of a frame in K, shape (y, x); NaN out of range."""
+        ...
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ShownImage(Brief):
+    """An image as a figure shows it.
+
+    Temperatures and differences of temperatures are in K, others in `unit`; NaN where undefined.
+    """
+
+    title: str
+    values: Array
+    raster: Raster
+    unit: str
+    is_temperature: bool
+    """Whether the values are temperatures, which pages show in °C, and no differences of them."""
+
+    @classmethod
+    def of(cls, panel: Panel) -> "ShownImage":
+        """Return the image of a panel, whose temperatures are in °C."""
+        if panel.unit != "°C":
+            return cls(panel.name, panel.values, panel.raster, panel.unit, False)
+        return cls(panel.name, panel.values + ZERO_CELSIUS, panel.raster, "K", True)
+
+
+@dataclass(eq=False)
+class Opened:
+    """The open file of one page; `frames`, `frame` and `images` change with what the page shows.
+
+    The keys of `figures`, Bokeh's figures with axes in µm, are the names of the images: ``scene``,
+    ``measured``, ``corrected``, ``half_width``, ``true`` and ``error``, as far as there are any.
+    """
+
+    name: str
+    source: str
+    """The file as a session names it."""
+    notes: Notes
+    figures: Mapping[str, Any]
+    frames: Frames
+    """Of a scene those of the camera with its present settings."""
+    frame: int = field(init=False, default=0)
+    """Index of the frame that is shown."""
+    images: Mapping[str, ShownImage] = field(init=False, default_factory=dict)
+    measured: Measurement | None = field(init=False, default=None)
+    """The frame that is shown, with its band and flags; None of a correction."""
+    corrected: Corrected | None = field(init=False, default=None)
+    """The frame's correction, if it is shown."""
+    reflected: float | None = field(init=False, default=None)
+    """Temperature of the reflected surroundings in K, if the page states it."""
+    _listeners: list[Callable[[], None]] = field(init=False, default_factory=list, repr=False)
+
+    def watch(self, listener: Callable[[], None]) -> None:
+        """Call a function after each change of `images`, in the thread of the page."""
+        self._listeners.append(listener)
+
+    def show(
+        self, picture: Picture, frames: Frames, frame: int, measured: Measurement | None
+    ) -> None:
+        """Take the images of an exact picture, all frames, and the index and data of its frame."""
+        self.images = {name: ShownImage.of(panel) for name, panel in picture.panels.items()}
+        self.frames, self.frame = frames, frame
+        self.measured, self.corrected = measured, picture.corrected
+        self.reflected = picture.state.study.camera.reflected
+        for listener in self._listeners:
+            listener()

@@ -1,0 +1,187 @@
+"""Bokeh's tools on the images: they draw places, and move their handles."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, get_args
+
+import numpy as np
+from bokeh.events import SelectionGeometry
+from bokeh.models import (
+    BoxSelectTool,
+    ColumnDataSource,
+    CustomJS,
+    FreehandDrawTool,
+    LabelSet,
+    PointDrawTool,
+    PolySelectTool,
+    RadioButtonGroup,
+)
+
+from chipglow.app.figures import MICRONS
+from chipglow.app.marks import Kind, Mark
+from chipglow.drawing.scales import COLOURS
+from chipglow.scene.regions import Point
+
+_TOOLS: Final[tuple[str, ...]] = ("look", *get_args(Kind), "edit")
+"""What a press on an image does: move cursor and view, draw a place, or edit one."""
+
+_ACTIVATE: Final = """
+const chosen = cb_obj.active;
+groups.forEach((group, i) => { if (i !== chosen) for (const tool of group) tool.active = false; });
+for (const tool of groups[chosen]) tool.active = true;
+"""
+"""Makes the tools of a choice the active ones of all figures."""
+
+_BUTTONS: Final = ":host(.solid) .bk-btn-group { flex-wrap: wrap; }"
+
+
+class DrawnPlaces:
+    """The outlines of places on all images, and the tools that draw and edit them.
+
+    `drawn` takes the kind and the points of a new place, `moved` the index of a place, that of its
+    handle and where it is now, `removed` the index of a place, `chosen` the name of a tool; points
+    are in m.
+    """
+
+    def __init__(
+        self,
+        figures: Mapping[str, Any],
+        drawn: Callable[[Kind, tuple[Point, ...]], None],
+        moved: Callable[[int, int, Point], None],
+        removed: Callable[[int], None],
+        chosen: Callable[[str], None],
+    ) -> None:
+        self._drawn, self._moved, self._removed = drawn, moved, removed
+        self._outlines = ColumnDataSource({"xs": [], "ys": [], "colour": []}, name="outlines")
+        self._labels = ColumnDataSource({"x": [], "y": [], "name": [], "colour": []})
+        self._handles = ColumnDataSource(
+            {"x": [], "y": [], "colour": [], "mark": [], "handle": []}, name="handles"
+        )
+        self._shown: dict[str, list[Any]] = {}
+        self._points = ColumnDataSource({"x": [], "y": []})
+        self._strokes = ColumnDataSource({"xs": [], "ys": []})
+        self.isotherm = ColumnDataSource({"xs": [], "ys": []}, name="isotherm")
+        groups: list[list[Any]] = [[] for _ in _TOOLS]
+        for one in figures.values():
+            tools = self._draw_on(one)
+            for group, tool in zip(groups[1:], tools, strict=True):
+                group.append(tool)
+                one.add_tools(tool)
+            one.on_event(SelectionGeometry, self._on_geometry)
+        self._handles.on_change("data", self._on_handles)
+        self._points.on_change("data", self._on_point)
+        self._strokes.on_change("data", self._on_stroke)
+        labels = [name.capitalize() for name in _TOOLS]
+        self.choice = RadioButtonGroup(labels=labels, active=0, stylesheets=[_BUTTONS])
+        self.choice.on_change("active", lambda attr, old, new: chosen(self._kind))
+        self.choice.js_on_change("active", CustomJS(args={"groups": groups}, code=_ACTIVATE))
+
+    def show(self, marks: Sequence[Mark]) -> None:
+        """Show the outlines, names and handles of places."""
+        colours = [colour_of(number) for number in range(len(marks))]
+        outlines = [MICRONS * mark.outline.T for mark in marks]
+        firsts = [outline[:, 0].tolist() for outline in outlines]
+        self._outlines.data = {
+            "xs": [x.tolist() for x, _ in outlines],
+            "ys": [y.tolist() for _, y in outlines],
+            "colour": colours,
+        }
+        self._labels.data = {
+            "x": [x for x, _ in firsts],
+            "y": [y for _, y in firsts],
+            "name": [mark.name for mark in marks],
+            "colour": colours,
+        }
+        handles = [
+            (MICRONS * x, MICRONS * y, colours[number], number, index)
+            for number, mark in enumerate(marks)
+            for index, (x, y) in enumerate(mark.handles)
+        ]
+        names = ("x", "y", "colour", "mark", "handle")
+        columns = zip(*handles, strict=True) if handles else ([] for _ in names)
+        self._shown = {name: list(one) for name, one in zip(names, columns, strict=True)}
+        self._handles.data = self._shown
+
+    def _draw_on(self, one: Any) -> list[Any]:
+        """Draw the places on a figure, and return its tools in the order of the choices."""
+        for colour, width in (("black", 3.4), ("colour", 1.8)):
+            one.multi_line("xs", "ys", source=self._outlines, line_color=colour, line_width=width)
+        one.multi_line(
+            "xs", "ys", source=self.isotherm, line_color="white", line_width=1.6, line_dash="4 2"
+        )
+        one.add_layout(
+            LabelSet(
+                x="x", y="y", text="name", source=self._labels, x_offset=4, y_offset=4,
+                text_font_size="11px", text_color="white", background_fill_color="#16191d",
+                background_fill_alpha=0.6,
+            )
+        )  # fmt: skip
+        handles = one.scatter(
+            "x", "y", source=self._handles, size=9, fill_color="colour", line_color="black"
+        )
+        points = one.scatter("x", "y", source=self._points, size=9)
+        strokes = one.multi_line("xs", "ys", source=self._strokes, line_color="white")
+        return [
+            PointDrawTool(renderers=[points], drag=False),
+            FreehandDrawTool(renderers=[strokes]),
+            BoxSelectTool(renderers=[], persistent=False),
+            BoxSelectTool(renderers=[], persistent=False, origin="center"),
+            PolySelectTool(renderers=[], persistent=False),
+            PointDrawTool(renderers=[handles], add=False),
+        ]
+
+    def _on_geometry(self, event: SelectionGeometry) -> None:
+        """Take a box, a circle about the middle of a box, or a polygon."""
+        if not event.final:
+            return
+        shape = event.geometry
+        if shape["type"] == "poly":
+            self._drawn("polygon", _metres(shape["x"], shape["y"]))
+            return
+        x, y = (shape["x0"], shape["x1"]), (shape["y0"], shape["y1"])
+        if self._kind == "circle":
+            middle = (sum(x) / 2, sum(y) / 2)
+            self._drawn("circle", _metres((middle[0], x[1]), (middle[1], y[1])))
+        else:
+            self._drawn("box", _metres(x, y))
+
+    @property
+    def _kind(self) -> str:
+        """The choice of the user."""
+        return _TOOLS[int(self.choice.active)]
+
+    def _on_point(self, _name: str, _old: Any, new: Mapping[str, Any]) -> None:
+        if len(new["x"]):
+            points = _metres(new["x"], new["y"])
+            self._points.data = {"x": [], "y": []}
+            self._drawn("point", points[-1:])
+
+    def _on_stroke(self, _name: str, _old: Any, new: Mapping[str, Any]) -> None:
+        if len(new["xs"]):
+            points = _metres(new["xs"][-1], new["ys"][-1])
+            self._strokes.data = {"xs": [], "ys": []}
+            self._drawn("line", (points[0], points[-1]))
+
+    def _on_handles(self, _name: str, _old: Any, new: Mapping[str, Any]) -> None:
+        """Take a handle that was moved, or a place of which one was removed."""
+        marks, handles = (np.asarray(new[name], np.int_) for name in ("mark", "handle"))
+        before = list(zip(self._shown["mark"], self._shown["handle"], strict=True))
+        now = list(zip(marks.tolist(), handles.tolist(), strict=True))
+        if len(now) < len(before):
+            self._removed(next(mark for mark, handle in before if (mark, handle) not in now))
+            return
+        old = np.array([self._shown["x"], self._shown["y"]], np.float64)
+        found = np.array([new["x"], new["y"]], np.float64)
+        for index in np.flatnonzero((old != found).any(axis=0)).tolist():
+            ((x, y),) = _metres([found[0, index]], [found[1, index]])
+            self._moved(*now[index], (x, y))
+            return
+
+
+def colour_of(number: int) -> str:
+    """Return the colour of a place by its index."""
+    return COLOURS[number % len(COLOURS)]
+
+
+def _metres(x: Sequence[float], y: Sequence[float]) -> tuple[Point, ...]:
+    """Return points of a figure in m."""
+    return tuple((float(a) / MICRONS, float(b) / MICRONS) for a, b in zip(x, y, strict=True))

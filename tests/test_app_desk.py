@@ -1,0 +1,311 @@
+"""Files of cameras and other programs in the app: their settings, correction, and two cameras."""
+
+from types import SimpleNamespace
+
+import camera_files
+import numpy as np
+import pytest
+import tifffile
+
+from chipglow.app.asking import contents_of, settings_of
+from chipglow.app.controls import CORRECTION_IMAGES
+from chipglow.app.opening import Asking, OpenFiles, open_any
+from chipglow.app.pictures import SceneModel
+from chipglow.app.view import PageView
+from chipglow.camera import Camera, GaussianPSF, Measurement
+from chipglow.correction import Zone, correct, surroundings_of
+from chipglow.io import write_measurement
+from chipglow.io.cameras.ptw import Ptw
+from chipglow.laboratory.recordings import CameraFrames, load_description, load_measurement
+from chipglow.quantities import ZERO_CELSIUS
+
+pytest.importorskip("panel", reason="needs the extra app")
+
+CALIBRATION = """\
+model: linear
+band: 3.8-5.1 um
+lowest: 50 degC
+highest: 1500 degC
+parameters: {offset: 500.0, gain: 10.0}
+covariance: [[25.0, 0.0], [0.0, 1.0e-4]]
+"""
+KELVINS = {"unit": "0.1 K", "interval": "1 ms", "pitch": "15 um", "band": "3.8-5.1 um"}
+
+
+def spot(frames=6, rows=40, columns=60):
+    """Counts of a hot spot that rises from frame to frame."""
+    y, x = np.mgrid[:rows, :columns]
+    image = 5000 + 6000 * np.exp(-((x - 30) ** 2 + (y - 20) ** 2) / 2 / 8**2)
+    return np.stack([image + 40 * number for number in range(frames)]).astype(np.uint16)
+
+
+@pytest.fixture
+def ptw(tmp_path):
+    (tmp_path / "cal.yaml").write_text(CALIBRATION)
+    path = tmp_path / "run.ptw"
+    path.write_bytes(camera_files.ptw(spot()))
+    return path, {"pitch": "15 um", "calibration": str(tmp_path / "cal.yaml")}
+
+
+@pytest.fixture
+def tiff(tmp_path):
+    path = tmp_path / "run.tif"
+    tifffile.imwrite(path, spot(), photometric="minisblack")
+    return path, dict(KELVINS)
+
+
+@pytest.fixture
+def files():
+    held = OpenFiles(open_any(None))
+    yield held
+    held.close()
+
+
+def opened(files, path, settings):
+    return files._answered(open_any(path), "measurement", settings)
+
+
+def typed(settings):
+    return [f"{name}={text}" for name, text in settings.items()]
+
+
+# Frames one by one
+
+
+@pytest.mark.parametrize("kind", ["ptw", "tiff"])
+@pytest.mark.parametrize("frames", ["none", "1:6:2"])
+def test_frames_one_by_one_are_those_of_the_whole_file(request, kind, frames):
+    path, settings = request.getfixturevalue(kind)
+    settings = typed({**settings, "frames": frames})
+    whole = load_measurement(path, settings)
+    one_by_one = CameraFrames(load_description(path, settings), path.name)
+    np.testing.assert_array_equal(one_by_one.times, whole.times)
+    assert one_by_one.raster == whole.raster
+    for index in reversed(range(len(whole))):
+        frame = one_by_one.measurement(index)
+        assert frame.times[0] == whole.times[index]
+        np.testing.assert_array_equal(frame.radiance[0], whole.radiance[index])
+        np.testing.assert_array_equal(frame.flags[0], whole.flags[index])
+    one_by_one.close()
+
+
+def test_a_file_is_opened_by_reading_its_first_frame(ptw, files, monkeypatch):
+    read, picture = [], Ptw.picture
+
+    def noted(self, number):
+        read.append(number)
+        return picture(self, number)
+
+    monkeypatch.setattr(Ptw, "picture", noted)
+    model = opened(files, *ptw)
+    shown = model.picture(model.controls.initial)
+    assert set(read) == {0} and len(model.times) == 6
+    third = model.controls.state_with(model.controls.initial, {"start": f"{1e6 * 3 / 600} us"})
+    assert model.picture(third).data["measured"].max() > shown.data["measured"].max()
+    assert set(read) == {0, 3}
+
+
+def test_a_measurement_in_netcdf_is_read_frame_by_frame(ptw, tmp_path):
+    whole = load_measurement(ptw[0], typed(ptw[1]))
+    write_measurement(whole, tmp_path / "run.nc")
+    model = open_any(tmp_path / "run.nc")
+    assert not model.measured._data["radiance"].variable._in_memory
+    np.testing.assert_array_equal(model.kelvins(4), whole.radiance_temperature()[4])
+
+
+# Settings that a file lacks
+
+
+def test_the_app_asks_with_the_words_and_limits_of_the_command(ptw, files):
+    path, settings = ptw
+    asking = files._tried(open_any(path))
+    assert isinstance(asking, Asking)
+    for given in ({}, {"pitch": "15 kg"}, {"pitch": "-3 um"}, {"pitch": "15 um", "band": "5-4 um"}):
+        with pytest.raises(ValueError, match=r".") as error:
+            load_measurement(path, typed(given))
+        again = asking.answered("measurement", given, files.folder, files.process)
+        assert again.error == str(error.value).replace(str(path), path.name)
+        assert not path.with_name("run.ptw.yaml").exists()
+    assert {"pitch", "calibration"} < settings_of("measurement").keys() > settings.keys()
+
+
+@pytest.mark.parametrize("kind", ["ptw", "tiff"])
+def test_the_settings_are_saved_beside_the_file_for_the_app_and_the_command(request, files, kind):
+    path, settings = request.getfixturevalue(kind)
+    model = opened(files, path, settings)
+    beside = path.with_name(f"{path.name}.yaml")
+    assert beside.read_text(encoding="utf-8") == model.description
+    assert str(path.parent) not in model.description.replace(settings.get("calibration", "-"), "")
+    expected = load_measurement(path, typed(settings))
+    np.testing.assert_array_equal(load_measurement(beside).radiance, expected.radiance)
+    for again in (files._tried(open_any(path)), open_any(beside)):
+        np.testing.assert_array_equal(again.kelvins(2), expected.radiance_temperature()[2])
+
+
+def test_the_content_follows_from_the_file(ptw, tiff, tmp_path):
+    (tmp_path / "mesh.vtu").write_text("<VTKFile/>")
+    np.savez(tmp_path / "grid.npz", temperature=np.full((2, 8, 9), 300.0))
+    (tmp_path / "letter.doc").write_text("Dear reader")
+    names = {"run.ptw": ("measurement",), "run.tif": ("measurement",), "mesh.vtu": ("scene",)}
+    names |= {"grid.npz": ("measurement", "scene"), "letter.doc": ()}
+    assert {name: contents_of(tmp_path / name) for name in names} == names
+
+
+def test_fields_of_another_program_become_a_scene(tmp_path, files):
+    y, x = np.mgrid[:30, :40]
+    path = tmp_path / "grid.npz"
+    np.savez(path, temperature=300.0 + 10 * x + 0 * y, x=2e-3 * np.arange(40), y=2e-3 * y[:, 0])
+    asking = files._tried(open_any(path))
+    assert asking.contents == ("measurement", "scene") and asking.error == ""
+    refused = files._answered(asking, "scene", {"units.length": "kg"})
+    assert "units.length" in refused.error
+    model = files._answered(asking, "scene", {"units.length": "mm"})
+    assert isinstance(model, SceneModel)
+    assert model.raster.spacing == pytest.approx(2e-6)
+    assert path.with_name("grid.npz.yaml").read_text(encoding="utf-8").count("length: mm") == 1
+
+
+def test_a_dropped_file_is_asked_for_and_removed_at_the_end(ptw, files):
+    path, settings = ptw
+    key = files.add("C:/run.ptw", path.read_bytes())
+    assert isinstance(files.find(key), Asking) and files.find(key).name == "run.ptw"
+    assert files.answer(key, "measurement", settings).name == "run.ptw"
+    assert files.find(key).raster.shape == (40, 60)
+    with pytest.raises(ValueError, match=r"^holiday\.nc: "):
+        files.add("holiday.nc", b"no scene" * 100)
+    files.close()
+    assert not files.folder.exists()
+
+
+# Correction of a measurement
+
+
+CORRECTED = {"emissivity": "0.6", "camera.psf": "gaussian", "camera.psf.fwhm": "20"}
+
+
+@pytest.fixture
+def model(ptw, files):
+    return opened(files, *ptw)
+
+
+def test_a_measurement_is_corrected_as_by_the_library(model, ptw):
+    initial = model.controls.initial
+    assert model.needs(initial) == "the emissivity and the point spread function (PSF)"
+    assert np.isnan(model.picture(initial).panels["corrected"].values).all()
+    state = model.controls.state_with(initial, CORRECTED)
+    assert model.needs(state) == ""
+    done = []
+    picture = model.corrected(model.picture(state), done.append)
+    assert done == sorted(done) and done[-1] == 1.0
+    assert tuple(picture.panels) == model.images == ("measured", "corrected", "half_width")
+    whole = load_measurement(ptw[0], typed(ptw[1]))
+    raster = picture.corrected.correction.raster
+    rows, columns = (
+        [int(np.argmin(abs(whole.data[axis].values - one))) for one in getattr(raster, axis)]
+        for axis in "yx"
+    )
+    camera = Camera(
+        band=whole.band, pitch=15e-6, psf=GaussianPSF(20e-6), reflected=293.0, fill_factor=1.0
+    )
+    expected = correct(
+        Measurement(whole.data.isel(time=[0], y=rows, x=columns)),
+        camera,
+        [Zone("image", 0.6, None, 0.01)],
+        surroundings=surroundings_of(camera),
+    )
+    corrected = picture.panels["corrected"].values
+    np.testing.assert_array_equal(corrected, expected.data["temperature"][0].values - ZERO_CELSIUS)
+    np.testing.assert_array_equal(picture.panels["half_width"].values, expected.half_width())
+    # Nearby the images are the same objects: nothing of them is sent again.
+    x, y = (1e6 * one for one in state.cursor)
+    near = model.picture(model.controls.state_with(state, {"cursor": f"{x + 15},{y}"}))
+    assert all(near.panels[name].values is picture.panels[name].values for name in model.images)
+    other = model.picture(model.controls.state_with(state, {"emissivity": "0.5"}))
+    assert other.corrected is None
+
+
+def test_the_page_lists_the_three_largest_contributions(model):
+    state = model.controls.state_with(model.controls.initial, CORRECTED)
+    picture = model.corrected(model.picture(state), lambda done: None)
+    view, sent = PageView(model), []
+    view.page._send_msg = sent.append
+    view._show_numbers(picture, model.numbers(picture), {})
+    html = sent[-1]["content"]
+    pixel = picture.corrected.at(state.cursor)
+    ordered = sorted(pixel.contributions, key=pixel.contributions.get, reverse=True)
+    places = [html.index(f">{name.capitalize()}<") for name in ordered[:3]]
+    assert places == sorted(places) and "Others" in html
+    assert all(f">{name.capitalize()}<" not in html for name in ordered[3:])
+    assert f"{pixel.temperature - ZERO_CELSIUS:.1f} °C ± {pixel.expanded_uncertainty:.1f} K" in html
+
+
+def test_what_is_open_is_given_to_panels_in_kelvins(model):
+    view, seen = PageView(model), []
+    view.page._send_msg = lambda message: None
+    view.opened.watch(lambda: seen.append(dict(view.opened.images)))
+    state = model.controls.state_with(model.controls.initial, {"start": "5000"})
+    view._show_picture(1, model.picture(state))
+    shown = seen[0]["measured"]
+    # Images are shown in °C with 64 bits.
+    np.testing.assert_allclose(shown.values, view.opened.frames.kelvins(3), rtol=1e-12)
+    assert (shown.unit, shown.is_temperature, view.opened.frame) == ("K", True, 3)
+    assert not seen[0]["half_width"].is_temperature
+    assert set(view.opened.figures) == set(model.images)
+
+
+# Two cameras
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return open_any(None)
+
+
+def test_two_cameras_see_one_scene_on_one_scale(scene):
+    controls = scene.controls
+    state = controls.state_with(controls.initial, {"images": "cameras", "camera.pitch": "5"})
+    state = controls.state_with(state, {"edited": "second"})
+    state = controls.state_with(state, {"camera.pitch": "12"})
+    state = controls.state_with(state, {"set_emissivity": "0.6"})
+    assert (state.study.camera.pitch, state.second.study.camera.pitch) == (5e-6, 12e-6)
+    assert controls.shown(state)["camera.pitch"] == "12"
+    assert controls.state_with(controls.initial, dict(state.texts)) == state  # as a link does
+    panels = scene.picture(state).panels
+    assert tuple(panels) == scene.shown(state) == ("scene", "measured", "second")
+    assert len({panel.limits for panel in panels.values()}) == 1
+    first, second = (
+        scene.picture(controls.state_with(controls.initial, {"camera.pitch": pitch}))
+        for pitch in ("5", "12")
+    )
+    np.testing.assert_array_equal(panels["measured"].values, first.panels["measured"].values)
+    camera = second.camera
+    measured = second.panels["measured"].values + ZERO_CELSIUS
+    surroundings = float(surroundings_of(camera).values)
+    own, mirrored = camera.band.radiance(measured), float(camera.band.radiance(surroundings))
+    by_hand = camera.band.temperature((own - 0.4 * mirrored) / 0.6) - ZERO_CELSIUS
+    # Rounding of the tables of radiance.
+    np.testing.assert_allclose(panels["second"].values, by_hand, atol=1e-6)
+    numbers = scene.numbers(scene.picture(state))
+    assert numbers["second"] > numbers["first"]
+    back = controls.state_with(state, {"images": "error"})
+    assert controls.shown(back)["camera.pitch"] == "5"
+
+
+def test_an_impossible_setting_of_the_second_camera_is_named(scene):
+    controls = scene.controls
+    state = controls.state_with(controls.initial, {"images": "cameras", "edited": "second"})
+    with pytest.raises(ValueError, match=r"^Pixel pitch: 7 kg|^Pixel pitch: '7 kg'"):
+        controls.state_with(state, {"camera.pitch": "7 kg"})
+    with pytest.raises(ValueError, match=r"^Emissivity set: 0, expected more than 0, up to 1"):
+        controls.state_with(state, {"set_emissivity": "0"})
+
+
+def test_a_scene_has_truth_and_error_next_to_the_correction(scene):
+    state = scene.controls.state_with(scene.controls.initial, {"images": "correction"})
+    assert scene.shown(state) == ("measured", *CORRECTION_IMAGES)
+    assert set(CORRECTION_IMAGES) == {"corrected", "half_width", "true", "error"}
+    sent = []
+    view = PageView(scene)
+    view.page._send_msg = sent.append
+    view._receive(SimpleNamespace(data={"n": 1, "kind": "cancel", "content": ""}))
+    assert sent[-1]["content"]["text"].endswith("was cancelled.")

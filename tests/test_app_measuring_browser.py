@@ -1,0 +1,127 @@
+"""Places that a user draws in Chromium: a row, a curve, files, and the session again.
+
+Without Chromium or Playwright these tests are skipped. CHIPGLOW_CHROMIUM names another browser.
+"""
+
+import re
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import pandas as pd
+import pytest
+from hot_frames import hot_frames
+
+from chipglow.io import write_measurement
+from chipglow.laboratory.emissivity import load_places
+from chipglow.laboratory.readings import read_places
+
+pytest.importorskip("panel", reason="needs the extra app")
+playwright = pytest.importorskip("playwright.sync_api", reason="needs Playwright")
+from test_app_browser import CHROMIUM, FLAGS, PATIENCE, local, place  # noqa: E402
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium, which is not installed"),
+]
+
+FIGURE = "measured_figure"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def visited(browser, file, width, height):
+    """The page of a file; nothing may go wrong in it or leave the machine."""
+    command = [sys.executable, "-m", "chipglow", "app", str(file), "--no-browser"]
+    wrong = []
+    with subprocess.Popen(command, stdout=subprocess.PIPE, encoding="utf-8") as server:
+        try:
+            url = re.search(r"http://\S+", server.stdout.readline())[0]
+            context = browser.new_context(viewport={"width": width, "height": height})
+            context.set_default_timeout(PATIENCE)
+            page = context.new_page()
+            page.on("pageerror", lambda error: wrong.append(str(error)))
+            page.on("request", lambda one: None if local(one.url) else wrong.append(one.url))
+            page.goto(url)
+            page.locator("#status", has_text=re.compile("^(Measured image|Corrected)")).wait_for()
+            yield page
+            context.close()
+        finally:
+            server.terminate()
+            server.wait(30)
+    assert wrong == []
+
+
+def choose(page, tool):
+    page.get_by_role("button", name=tool, exact=True).click()
+
+
+def drag(page, start, end):
+    page.mouse.move(*place(page, FIGURE, *start))
+    page.mouse.down()
+    middle = [(a + b) / 2 for a, b in zip(start, end, strict=True)]
+    page.mouse.move(*place(page, FIGURE, *middle))
+    page.mouse.move(*place(page, FIGURE, *end))
+    page.mouse.up()
+
+
+def rows(page, count):
+    """Texts of the table's rows once there are so many: name, pixels, mean, ..."""
+    found = page.locator(".tabulator-row")
+    playwright.expect(found).to_have_count(count, timeout=PATIENCE)
+    return [text.split("\n") for text in found.all_inner_texts()]
+
+
+def saved(page, label, file):
+    with page.expect_download() as started:
+        page.get_by_text(label, exact=True).click()
+    started.value.save_as(file)
+
+
+def test_drawn_places_have_rows_and_curves_and_a_session_brings_them_back(browser, tmp_path):
+    image = hot_frames()
+    write_measurement(image, tmp_path / "hot.nc")
+    session = tmp_path / "session.yaml"
+    with visited(browser, tmp_path / "hot.nc", 1400, 900) as page:
+        choose(page, "Box")
+        drag(page, (150, 150), (300, 240))
+        ((name, pixels, mean, *_),) = rows(page, 1)
+        choose(page, "Point")
+        page.mouse.click(*place(page, FIGURE, 243, 189))
+        rows(page, 2)
+        # The curve of the new point, over all frames.
+        page.wait_for_function("""() => {
+          const data = Bokeh.documents[0].get_model_by_name("over_time").data;
+          return data.name.length === 2 && data.ys[1].length === 4;
+        }""")
+        choose(page, "Polygon")
+        for corner in ((200, 300), (280, 300), (240, 220)):
+            page.mouse.click(*place(page, FIGURE, *corner))
+            page.wait_for_timeout(400)  # ms: else Bokeh takes two clicks for a double one
+        page.keyboard.press("Enter")
+        assert rows(page, 3)[2][0] == "polygon 1"
+        saved(page, "Session, YAML", session)
+        saved(page, "Table, CSV", tmp_path / "places.csv")
+    places = load_places(session).places()
+    found = read_places(image, places).to_frame().set_index("place")
+    assert (name, pixels) == ("box 1", str(found.pixels["box 1"]))
+    assert mean == f"{found.mean_degC['box 1']:.1f}"
+    # A pixel of the screen is about 2 µm, a drag ends within two of them.
+    left, top, right, bottom = places[0].shape.outline[[0, 2]].ravel() * 1e6
+    assert [left, top, right, bottom] == pytest.approx([150, 150, 300, 240], abs=5)
+    table = pd.read_csv(tmp_path / "places.csv", encoding="utf-8-sig").set_index("place")
+    for name, kelvins in table.mean_degC.items():  # nine digits
+        assert kelvins == pytest.approx(found.mean_degC[name], rel=1e-8)
+    with visited(browser, session, 400, 900) as page:
+        assert {one[0] for one in rows(page, 3)} == {"box 1", "point 1", "polygon 1"}
+        assert page.evaluate("document.documentElement.scrollWidth") == 400
+        choose(page, "Box")
+        drag(page, (100, 250), (160, 300))
+        rows(page, 4)
