@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 from typing import Any, Final
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 from sphinx_gallery.scrapers import figure_rst
@@ -14,6 +15,8 @@ THUMBNAIL: Final = (480, 336)
 """Largest width and height in pixels: twice those in which a page shows them."""
 MARGIN: Final = 0.04
 """Of a panel, in inches."""
+WIDEST: Final = 4.0
+"""Width of a panel in inches above which its words would be too small: it is drawn narrower."""
 SHOWN_PANEL: Final = {
     **{"detector": 1, "optics": 5, "psf": 3, "reflections": 1, "shutter": 1, "steps": 3},
     **{"tool_edges": 1, "camera_files": 1, "correction": 1, "registration": 1},
@@ -53,13 +56,28 @@ def save_panel(figure: Figure, path: Path) -> None:
     """Save one panel of an example's first figure, as its thumbnail, in the folder `PANELS`."""
     name = path.name.replace("_001.", "_thumb.")
     axes = figure.axes[SHOWN_PANEL.get(name.removeprefix("sphx_glr_").split("_thumb")[0], 0)]
-    bounds = axes.get_tightbbox()
-    assert bounds is not None, f"{path}: its panel is invisible"
-    inches = Bbox(bounds.transformed(figure.dpi_scale_trans.inverted())).padded(MARGIN)
+    size, legends = figure.get_size_inches(), list(figure.legends)
+    if (width := _extent(figure, axes).width) > WIDEST:
+        figure.set_size_inches(size[0] * WIDEST / width, size[1])
+        legends += [legend] if (legend := axes.get_legend()) else []
+    for legend in legends:  # of all panels, or too wide
+        legend.set(visible=False, in_layout=False)
+    figure.draw_without_rendering()
+    bounds = _extent(figure, axes)
     folder = path.parent / PANELS
     folder.mkdir(exist_ok=True)
-    dots = min(THUMBNAIL[0] / inches.width, THUMBNAIL[1] / inches.height)
-    figure.savefig(folder / name, dpi=dots, bbox_inches=inches)
+    dots = min(THUMBNAIL[0] / bounds.width, THUMBNAIL[1] / bounds.height)
+    figure.savefig(folder / name, dpi=dots, bbox_inches=bounds)
+    for legend in legends:
+        legend.set(visible=True, in_layout=True)
+    figure.set_size_inches(size)
+
+
+def _extent(figure: Figure, axes: Axes) -> Bbox:
+    """Return the extent in inches of axes with their labels, after the figure was drawn."""
+    bounds = axes.get_tightbbox()
+    assert bounds is not None, "the panel is invisible"
+    return Bbox(bounds.transformed(figure.dpi_scale_trans.inverted())).padded(MARGIN)
 
 
 def use_panels(app: Any) -> None:
