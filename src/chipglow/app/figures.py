@@ -263,8 +263,8 @@ class Figures:
 def _figure(name: str, title: str, height: int, **given: Any) -> Any:
     one = figure(
         name=f"{name}_figure", title=title, frame_width=_SIDE, frame_height=height, tools="",
-        toolbar_location=None, min_border=_PADDING, background_fill_color=None, border_fill_color=None,
-        outline_line_color=_GRID, **given,
+        toolbar_location=None, min_border=_PADDING, background_fill_color=None,
+        border_fill_color=None, outline_line_color=_GRID, **given,
     )  # fmt: skip
     one.grid.grid_line_color = _GRID
     one.axis.minor_tick_line_color = None
