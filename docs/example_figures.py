@@ -14,7 +14,7 @@ PANELS: Final = "panels"
 THUMBNAIL: Final = (480, 336)
 """Largest width and height in pixels: twice those in which a page shows them."""
 MARGIN: Final = 0.04
-"""Of a panel, in inches."""
+"""Width of a panel in inches."""
 WIDEST: Final = 4.0
 """Width of a panel in inches above which its words would be too small: it is drawn narrower."""
 SHOWN_PANEL: Final = {

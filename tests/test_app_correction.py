@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chipglow.app import pictures
+from chipglow.app import scene_model
 from chipglow.app.controls import CORRECTION_IMAGES
 from chipglow.app.files import study_file
 from chipglow.app.opening import open_any
@@ -28,7 +28,7 @@ MODE = {"images": "correction", "emissivity_uncertainty": "0.02"}
 @pytest.fixture(scope="module", autouse=True)
 def small():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pictures, "_HALF", SMALL)
+        patch.setattr(scene_model, "_HALF", SMALL)
         yield
 
 

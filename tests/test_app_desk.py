@@ -10,7 +10,7 @@ import tifffile
 from chipglow.app.asking import contents_of, settings_of
 from chipglow.app.controls import CORRECTION_IMAGES
 from chipglow.app.opening import Asking, OpenFiles, open_any
-from chipglow.app.pictures import SceneModel
+from chipglow.app.scene_model import SceneModel
 from chipglow.app.view import PageView
 from chipglow.camera import Camera, GaussianPSF, Measurement
 from chipglow.correction import Zone, correct, surroundings_of

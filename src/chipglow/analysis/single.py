@@ -40,7 +40,7 @@ _SEEDS: Final = 2**31
 """Seeds of textures and noise: those that fit into 31 bits."""
 
 _Key: TypeAlias = tuple[int, int]
-"""Number of a view of the schedule, and of a place in it."""
+"""Index of a view of the schedule, and of a place in it."""
 
 
 class SingleReadings:

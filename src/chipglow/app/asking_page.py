@@ -1,4 +1,4 @@
-"""The page that asks for the settings of a file: its fields are those of the description."""
+"""The page that asks for the settings of a file: it has the fields of the description."""
 
 from collections.abc import Mapping
 from typing import Any, Final

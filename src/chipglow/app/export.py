@@ -1,4 +1,4 @@
-"""Files of what is measured on the page: tables as CSV and Excel, and the picture as PNG."""
+"""Files of measured places: tables as CSV and Excel, and the picture as PNG."""
 
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec

@@ -9,7 +9,8 @@ from matplotlib import rc_context
 
 from chipglow.app.controls import State
 from chipglow.app.opening import SHOWN, SHOWN_LINE
-from chipglow.app.pictures import Picture, SceneModel
+from chipglow.app.pictures import Picture
+from chipglow.app.scene_model import SceneModel
 from chipglow.drawing.drawing import data_url, style
 from chipglow.io import write_dataset
 from chipglow.quantities import unchecked

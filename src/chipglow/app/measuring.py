@@ -25,8 +25,8 @@ from chipglow.app.export import csv_file, picture_file, workbook
 from chipglow.app.figures import MICRONS, TEXT
 from chipglow.app.marks import Kind, Mark, marks_of, new_name, places_text
 from chipglow.app.opened import Opened
-from chipglow.app.pictures import SceneFrames
 from chipglow.app.reading import MEASURED, Reader, table_of
+from chipglow.app.scene_model import SceneFrames
 from chipglow.app.session import PAUSE, Newest
 from chipglow.app.tools import DrawnPlaces, colour_of
 from chipglow.laboratory.emissivity import PlacesDescription
@@ -276,7 +276,7 @@ class Measuring:
             self._show_curves(None, ())
 
     def _read_curves(self, marks: tuple[Mark, ...]) -> None:
-        """Read places in all frames, in a thread of its own."""
+        """Read places in all frames, in a separate thread."""
         self._work.pause(PAUSE)
         curves = self._reader.curves(marks, self._check_frame)
         self._later(lambda: self._show_curves(curves, marks))

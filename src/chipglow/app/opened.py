@@ -81,7 +81,7 @@ class Opened:
     _listeners: list[Callable[[], None]] = field(init=False, default_factory=list, repr=False)
 
     def watch(self, listener: Callable[[], None]) -> None:
-        """Call a function after each change of what is shown, in the thread of the page."""
+        """Call a function after each change of the page, in the thread of the page."""
         self._listeners.append(listener)
 
     def show(

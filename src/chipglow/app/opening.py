@@ -24,14 +24,9 @@ from chipglow.app.asking import (
     save_description,
 )
 from chipglow.app.controls import CURSOR, LINES, Controls, rounded, shown_study
-from chipglow.app.pictures import (
-    CorrectionModel,
-    MeasuredFrames,
-    MeasurementModel,
-    Model,
-    SceneModel,
-    with_samples,
-)
+from chipglow.app.frames_model import CorrectionModel, MeasuredFrames, MeasurementModel
+from chipglow.app.models import Model
+from chipglow.app.scene_model import SceneModel, with_samples
 from chipglow.chip import Instant, Segment
 from chipglow.correction import Correction, is_correction, read_correction
 from chipglow.io import (

@@ -12,8 +12,8 @@ from bokeh.server.auth_provider import AuthProvider
 from tornado.web import RequestHandler
 
 from chipglow.app.asking_page import AskingPage
+from chipglow.app.models import Model
 from chipglow.app.opening import Asking, OpenFiles
-from chipglow.app.pictures import Model
 from chipglow.app.view import PageView
 
 LOCAL: Final = "127.0.0.1"

@@ -7,7 +7,10 @@ from threading import Event, Lock, Thread
 from typing import Final, Generic, TypeAlias, TypeVar
 
 from chipglow.app.controls import CORRECTION, State, Texts
-from chipglow.app.pictures import CorrectionModel, Model, Picture, SceneModel
+from chipglow.app.frames_model import CorrectionModel
+from chipglow.app.models import Model
+from chipglow.app.pictures import Picture
+from chipglow.app.scene_model import SceneModel
 
 PAUSE: Final = 0.15
 """Seconds without a newer state after a quick look before the exact picture is begun."""

@@ -22,7 +22,7 @@ from chipglow.drawing.scales import COLOURS
 from chipglow.scene.regions import Point
 
 _TOOLS: Final[tuple[str, ...]] = ("look", *get_args(Kind), "edit")
-"""What a press on an image does: move cursor and view, draw a place, or edit one."""
+"""Effect of a press on an image: move cursor and view, draw a place, or edit one."""
 
 _ACTIVATE: Final = """
 const chosen = cb_obj.active;

@@ -25,10 +25,13 @@ from chipglow.analysis.images import PARTS
 from chipglow.app.asking import description_path
 from chipglow.app.controls import CORRECTION, ERROR_IMAGES, WHOLE, Texts, rounded
 from chipglow.app.figures import TEXT, Figures
+from chipglow.app.frames_model import MeasurementModel
 from chipglow.app.measuring import Measuring
+from chipglow.app.models import Model
 from chipglow.app.opened import Opened
 from chipglow.app.opening import MOST_UPLOADED, OpenFiles
-from chipglow.app.pictures import Drawn, MeasurementModel, Model, Picture, SceneModel
+from chipglow.app.pictures import Drawn, Picture
+from chipglow.app.scene_model import SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.quantities.format import quantity_text, readable, rounded_text, uncertain_decimals
@@ -45,10 +48,10 @@ _DROPPER_STYLE: Final = """
 
 _VIEW_WIDTH: Final = 160.0
 _VIEW_SAMPLES: Final = 40
-"""Least width of the view of a place in µm, and in pixels or samples."""
+"""Smallest width of the view of a place in µm, and in pixels or samples."""
 
 _SHOWN_SOURCES: Final = 3
-"""Sources of uncertainty at the cursor that have a bar of their own."""
+"""Sources of uncertainty at the cursor with a separate bar."""
 
 _log = logging.getLogger(__name__)
 

@@ -74,7 +74,7 @@ def _ignored(error: "UnraisableHookArgs") -> None:
         again.daemon = True
         again.start()
     elif issubclass(error.exc_type, MemoryError):
-        print("chipglow: not enough memory for a part of what is shown", file=sys.stderr)
+        print("chipglow: not enough memory for a part of the page", file=sys.stderr)
     elif getattr(error.object, "__name__", "") != "__del__":
         sys.__unraisablehook__(error)
 

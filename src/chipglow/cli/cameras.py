@@ -32,8 +32,8 @@ def cameras(
     screen.say(f"Source: {preset['source']}.")
     screen.say(
         f"In a study: camera: {{preset: {name}, magnification: 2.5}}, or instead of the "
-        "magnification the distance of the pixels on the scene: pitch: 6 um. What is not stated "
-        "must be given."
+        "magnification the distance of the pixels on the scene: pitch: 6 um. Values that are not "
+        "stated must be given."
     )
 
 

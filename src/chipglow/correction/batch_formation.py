@@ -32,12 +32,12 @@ class BatchFormation:
 
     Each pixel has values at the same places: of its cells, or one mean of them if the pixels
     integrate before the blur. Near light is a sum of convolutions on the raster of the pixels, one
-    for each place; far light is that of means over groups of values. In single precision.
+    for each place; far light follows from means over groups of values. In single precision.
     """
 
     pixels: Raster
     means: Any
-    """Sparse array (value, cell) of the pixels' means; None if the values are those of cells."""
+    """Sparse array (value, cell) of the pixels' means; None if cells are the values."""
     spectra: NDArray[np.complex64]
     """Transforms of the kernels, (down, right, y, x) by the place of the value in its pixel."""
     size: tuple[int, int]
@@ -159,7 +159,7 @@ def _places_of(samples: Raster, pixels: Raster) -> int:
 
 
 def _spectra(exact: ImageFormation) -> tuple[NDArray[np.complex64], tuple[int, int]]:
-    """Return the transforms of the kernels and their size, from what a pixel receives."""
+    """Return the transforms of the kernels and their size, from the light that a pixel receives."""
     most, places = max(exact.pixels.shape), _places_of(exact.samples, exact.pixels)
     count = 2 * most + 1
     pixels = replace(exact.pixels, rows=count, columns=count)

@@ -46,7 +46,7 @@ class Hessian:
     """Factors of a similar matrix."""
 
     def solved(self, right: Array, error: float, relative: float = 0.0) -> Array:
-        """Solve approximately: the Hessian is that of the fast formation of images.
+        """Solve approximately, with the fast formation of images.
 
         `right` is (part,) or (part, error). The solution ends at an `error` in standard
         uncertainties, or at one `relative` to the solution.

@@ -190,7 +190,7 @@ class Numerics(Part):
     points_per_side: Annotated[
         int, Parameter("Material points along the side of a cell.", least=1, most=4)
     ] = 2
-    # Borders of the computed region in m, beyond what the cut heats and strains.
+    # Borders of the computed region in m, beyond the heated and strained material.
     upstream: float = 0.75e-3
     downstream: float = 0.55e-3
     depth: float = 0.35e-3

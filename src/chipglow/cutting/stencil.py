@@ -20,7 +20,7 @@ ADDED: Final = 8
 
 _DOUBLE: Final = ir.DoubleType()
 _LANE: Final = ir.IntType(32)
-"""Number of a lane of a vector: LLVM takes 32 bits."""
+"""Index of a lane of a vector: LLVM takes 32 bits."""
 _NODES: Final = types.float64[:, :, ::1]
 _THREE: Final = types.UniTuple(types.float64, 3)
 _AROUND: Final = (_NODES, types.int64, types.int64, _THREE, _THREE, _THREE, _THREE)

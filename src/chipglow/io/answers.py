@@ -30,7 +30,7 @@ _CLASSES: Final[Mapping[str, str]] = {
     "ObjectParameters": "chipglow.radiometry.object_parameters",
     "Notes": "chipglow.text.notes",
 }
-"""What an answer may consist of, besides numbers, texts, arrays, lists and mappings: each class by
+"""Classes in an answer, besides numbers, texts, arrays, lists and mappings: each by
 its module, so that a reader of meshes does not load what only a recording needs."""
 
 _KINDS: Final = "biufcSU"

@@ -38,7 +38,7 @@ _MOST_FILLED: Final = 0.5
 """Fraction of filled samples above which it is a warning."""
 
 _FAINTEST: Final = 1e-30
-"""Least scale of a pattern without light: as float32 it and its inverse are finite."""
+"""Smallest scale of a pattern without light: as float32 it and its inverse are finite."""
 
 _FLOW_FRAMES: Final = 5
 """Number of frames over which the optical flow is computed: little moves from one to the next."""

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from chipglow.quantities.units import Array
 
 TINY: Final = 1e-300
-"""Smaller than any quantity in SI units: the least divisor where 0 / 0 shall be 0, not NaN."""
+"""Smaller than any quantity in SI units: the smallest divisor where 0 / 0 must be 0, not NaN."""
 
 
 def quotient(part: Array, whole: ArrayLike) -> Array:

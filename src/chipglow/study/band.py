@@ -1,4 +1,4 @@
-"""What a study's camera shows of a hot band: a first answer about a camera, without a scene."""
+"""Reading of a hot band by a study's camera: a first answer about a camera, without a scene."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -71,7 +71,7 @@ _NO_CONTRIBUTION: Final = 0.05
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BandReading(Brief):
-    """What a camera shows of a hot band: how wrong, why, and how single frames differ.
+    """Reading of a hot band by a camera: its error, the causes, and the scatter of frames.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class BandReading(Brief):
     contributions : mapping
         Contribution of each effect to the error of the peak temperature in K; they sum to it.
     causes : tuple of str
-        What differs between the frames.
+        Differences between the frames.
     scene : Scene
         The scene.
     notes : Notes

@@ -36,7 +36,7 @@ _SAME_PITCH: Final = 1e-6
 """Largest relative difference of two pitches that are the same but for rounding."""
 
 _ABOUT: Final = ("source", "windows", "netd")
-"""What is stated of a camera by name beside fields of the section."""
+"""Entries of a camera by name beside fields of the section."""
 
 NEEDED: Final = ("band", "detector_pitch", "frame_rate")
 """Fields that a study must state if the data sheet does not."""

@@ -398,7 +398,7 @@ class AiryAperture(ApertureChoice):
 class MeasuredPSFFile(PSFChoice):
     """A kernel from a file.
 
-    It states what the file leaves open: None is for what a .nc file states. `MeasuredPSF` has the
+    It states values that the file does not: None for those of a .nc file. `MeasuredPSF` has the
     values.
     """
 

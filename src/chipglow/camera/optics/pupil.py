@@ -145,7 +145,7 @@ class _Aperture(PointSpreadFunction):
 
 @dataclass(frozen=True)
 class Wavefront(Part):
-    """What shapes the light of an aperture, and its spectrum."""
+    """Obscuration and aberrations of an aperture, and the spectrum of its light."""
 
     obscuration: Obscuration = 0.0
     defocus: Defocus = 0.0

@@ -48,7 +48,7 @@ class CircleSection(Part):
 class RegionSection(Part):
     """One region: a polygon, a rectangle or a circle.
 
-    Its name is its key in the file, and each shape is a key of its own; a `Region` has one shape.
+    Its name is its key in the file, and each shape has its own key; a `Region` has one shape.
     """
 
     polygon: Annotated[tuple[PointField, ...] | None, Parameter("Corners in order.")] = None
@@ -156,7 +156,7 @@ class PlacesDescription(Part):
         known = {*names, *(place.feature for place in places)}
         for name in self.emissivities.keys() - known:
             raise ValueError(
-                f"emissivities: {name!r} is no place or feature, expected one of {', '.join(known)}"
+                f"emissivities: {name!r} is not a place or feature, expected one of {', '.join(known)}"
             )
 
     def places(self) -> tuple[Region, ...]:

@@ -36,7 +36,7 @@ _SLOPE_STEP: Final = 1e-5
 """Step of a shape parameter for its slope, in its scale."""
 
 _LEAST_SCALE: Final = 1e-30
-"""Least divisor of radiances and of squared residuals that are all the same."""
+"""Smallest divisor of radiances and of squared residuals that are all the same."""
 
 _SINGULAR: Final = 1e-13
 """Eigenvalues below this part of the largest are rounding: a parameter that nothing determines."""

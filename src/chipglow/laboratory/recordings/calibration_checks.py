@@ -15,7 +15,7 @@ _CORRELATION_LEVEL: Final = 0.05
 """Significance level of residuals that are not independent."""
 
 _LEAST_FREE: Final = 1e-9
-"""Least part of a point's residual that the fit leaves free; less is rounding."""
+"""Smallest part of a point's residual that the fit leaves free; less is rounding."""
 
 _FAR_WITHIN: Final = 0.1
 """Mean squared residual, in the uncertainties, below which correlated residuals do no harm."""

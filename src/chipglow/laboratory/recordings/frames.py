@@ -85,7 +85,7 @@ class CameraFrames(_Frames):
     name : str
         Name in errors.
     process : ReaderProcess, optional
-        Process for formats that libraries in C or C++ unpack; one of its own by default.
+        Process for formats that libraries in C or C++ unpack; a separate one by default.
 
     Raises
     ------

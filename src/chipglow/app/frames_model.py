@@ -1,0 +1,307 @@
+"""Pictures of measured and of corrected frames, whose true temperature is not known."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from typing import ClassVar, Final, Protocol
+
+import numpy as np
+import xarray as xr
+
+from chipglow.app.controls import CORRECTING, REFERENCES, WHOLE, Controls, ShownStudy, State
+from chipglow.app.pictures import (
+    Corrected,
+    Panel,
+    Picture,
+    around_cursor,
+    crossings_of,
+    error_panel,
+    error_title,
+    lines_of,
+    measured_panel,
+    nearest_time,
+    pixel_at,
+    unflagged,
+    values_at,
+    with_correction,
+)
+from chipglow.camera import Camera, Measurement
+from chipglow.camera.exposure_kernels import Check
+from chipglow.correction import Correction, Zone, correct, surroundings_of
+from chipglow.laboratory.emissivity import PlacesDescription
+from chipglow.quantities import Array
+from chipglow.scene import Raster, Tool
+from chipglow.text import Notes
+
+REFERENCE: Final = "reference_temperature"
+"""Variable of a measurement that the app saved: the reference of its pixels in K."""
+
+
+_KEPT: Final = 8
+"""Corrections that a page keeps."""
+
+
+class _FramesModel(ABC):
+    """Frames whose true temperature is not known."""
+
+    coarse: ClassVar[None] = None
+
+    @property
+    @abstractmethod
+    def images(self) -> tuple[str, ...]:
+        """Names of the images."""
+
+    def shown(self, state: State) -> tuple[str, ...]:
+        """Return the names of the images at a state: always all."""
+        return self.images
+
+    def needs(self, state: State) -> str:
+        """Return what a correction still needs, in words; empty if nothing."""
+        return ""
+
+    @property
+    @abstractmethod
+    def times(self) -> Array:
+        """Times of the frames in s."""
+
+    @property
+    @abstractmethod
+    def raster(self) -> Raster:
+        """Grid of the pixels."""
+
+    @abstractmethod
+    def kelvins(self, index: int) -> Array:
+        """Return the radiance temperature of a frame in K, shape (y, x); NaN out of range."""
+
+    def frames(self, state: State) -> "_FramesModel":
+        """Return the frames, which do not depend on the state."""
+        return self
+
+    def frame(self, state: State) -> int:
+        """Return the index of the frame that began nearest to the state's start."""
+        return nearest_time(self.times, state)
+
+    def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
+        """Return nothing: an error is not known without the truth."""
+        return {}
+
+
+class MeasuredFrames(Protocol):
+    """Frames of a measurement, each read when it is asked for."""
+
+    first: Measurement
+    times: Array
+
+    @property
+    def notes(self) -> Notes:
+        """Assumptions and warnings."""
+
+    def measurement(self, index: int) -> Measurement:
+        """Return one frame."""
+
+
+@dataclass(eq=False)
+class MeasurementModel(_FramesModel):
+    """Frames of a measurement, their controls, and pictures; each session has a copy."""
+
+    name: str
+    measured: MeasuredFrames
+    controls: Controls
+    description: str = ""
+    """YAML of a camera file's settings."""
+    source: str = ""
+    """The file as a session names it."""
+    places: PlacesDescription | None = None
+    """Places and view of the session that was opened."""
+    _last: dict[int, tuple[xr.Dataset, dict[str, Panel], str]] = field(
+        init=False, default_factory=dict, repr=False
+    )
+    _corrected: dict[Hashable, Corrected] = field(init=False, default_factory=dict, repr=False)
+
+    @property
+    def times(self) -> Array:
+        return self.measured.times
+
+    @property
+    def raster(self) -> Raster:
+        return self.measured.first.raster
+
+    @property
+    def tool(self) -> Tool | None:
+        return self.measured.first.tool
+
+    @property
+    def notes(self) -> Notes:
+        """Assumptions and warnings."""
+        return self.measured.notes
+
+    def kelvins(self, index: int) -> Array:
+        return np.asarray(self.measured.measurement(index).radiance_temperature()[0])
+
+    @property
+    def images(self) -> tuple[str, ...]:
+        """Names of the images."""
+        error = ("error",) if REFERENCE in self.measured.first.data else ()
+        return ("measured", "corrected", "half_width", *error)
+
+    def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
+        """Return the frame that began nearest to the state's start."""
+        data, panels, label = self._shown(self.frame(state))
+        raster = self.raster
+        picture = Picture(
+            state, raster, data, panels, lines_of(state, raster, data),
+            crossings_of(state, self.tool), reference=label,
+        )  # fmt: skip
+        known = self._corrected.get(self._key(state))
+        return with_correction(picture, known, ("corrected", "half_width"))
+
+    def _shown(self, index: int) -> tuple[xr.Dataset, dict[str, Panel], str]:
+        """Return data and images of a frame, the last one again, and the label of its reference."""
+        if index in self._last:
+            return self._last[index]
+        measurement = self.measured.measurement(index)
+        raster, reference = measurement.raster, measurement.data.get(REFERENCE)
+        # The error is stated of pixels out of range too, as it is for a scene.
+        measured = measurement.radiance_temperature(flagged=reference is not None)[0]
+        images, label = {"measured": measured, "flagged": ~measurement.usable[0]}, ""
+        if reference is not None:
+            images["reference"] = reference[0].values
+            images["case_1"] = measured - images["reference"]
+            label = REFERENCES.get(str(reference.attrs.get("reference")), "reference")
+        data = xr.Dataset({name: (("y", "x"), image) for name, image in images.items()})
+        panels = {"measured": measured_panel(data, raster)}
+        if reference is not None:
+            values = unflagged(data, data["case_1"])
+            panels["error"] = error_panel(error_title(label), values, raster)
+        self._last = {index: (data, panels, label)}
+        return self._last[index]
+
+    def needs(self, state: State) -> str:
+        """Return what a correction still needs, in words; empty if nothing."""
+        study, band = state.study, "band_lower" in self.measured.first.data.attrs
+        missing = {
+            "the emissivity": study.emissivity is None,
+            "the point spread function (PSF)": study.camera.psf is None,
+            "the camera's band": not band,
+        }
+        return " and ".join(name for name, is_missing in missing.items() if is_missing)
+
+    def corrected(self, picture: Picture, check: Callable[[float], None]) -> Picture:
+        """Return a picture with the corrected image; `check` takes the completed fraction."""
+        state = picture.state
+        study, measurement = state.study, self.measured.measurement(self.frame(state))
+        rows, columns = self._part(state)
+        camera = self._camera(study, measurement)
+        whole = Zone("image", study.emissivity, None, study.emissivity_uncertainty)
+        result = correct(
+            Measurement(measurement.data.isel(y=rows, x=columns)),
+            camera,
+            [whole],
+            surroundings=surroundings_of(camera),
+            progress=check,
+        )
+        self._corrected[self._key(state)] = Corrected(result)
+        while len(self._corrected) > _KEPT:
+            del self._corrected[next(iter(self._corrected))]
+        return self.picture(state)
+
+    def _camera(self, study: ShownStudy, measurement: Measurement) -> Camera:
+        """Return the camera of the measurement, with the optics of the page."""
+        stated = study.camera
+        return Camera(
+            band=measurement.band,
+            pitch=measurement.raster.spacing,
+            fill_factor=float(measurement.data.attrs.get("fill_factor", 1.0)),
+            psf=None if stated.psf is None else stated.psf.for_camera(measurement.band, None),
+            reflected=stated.reflected,
+        )
+
+    def _part(self, state: State) -> tuple[slice, slice]:
+        size = state.study.corrected_part
+        if size == WHOLE:
+            rows, columns = self.raster.shape
+            return slice(0, rows), slice(0, columns)
+        return around_cursor(state, self.raster, int(size) // 2)
+
+    def _key(self, state: State) -> Hashable:
+        rows, columns = self._part(state)
+        return state.key(*CORRECTING), self.frame(state), rows.start, columns.start
+
+    def measurement_of(self, picture: Picture) -> Measurement:
+        """Return the frame of a picture."""
+        return self.measured.measurement(self.frame(picture.state))
+
+    def numbers(self, picture: Picture) -> dict[str, float]:
+        """Return the numbers at the cursor in K, with the calibration's uncertainty if known."""
+        numbers = values_at(picture.data, picture.raster, picture.state.cursor)
+        frame = self.measured.measurement(self.frame(picture.state))
+        if frame.calibration_errors is not None:
+            row, column = pixel_at(picture.raster, picture.state.cursor)
+            pixel = Measurement(frame.data.isel(y=[row], x=[column]))
+            pixel.band = frame.band  # which has its table of radiance already
+            values = np.full((1, 1, 1), numbers["measured"])
+            estimate = pixel.estimate(values, pixel.calibration_effects(0)[None])
+            numbers["uncertainty"] = float(estimate.standard_uncertainty[0, 0, 0])
+        return numbers
+
+
+@dataclass(eq=False)
+class CorrectionModel(_FramesModel):
+    """A correction that `chipglow correct` wrote, its controls, and its frames as pictures."""
+
+    name: str
+    correction: Correction
+    controls: Controls
+    source: str = ""
+    """The file as a session names it."""
+    places: PlacesDescription | None = None
+    """Places and view of the session that was opened."""
+    tool: ClassVar[None] = None
+    _last: dict[int, tuple[Corrected, xr.Dataset, Panel]] = field(
+        init=False, default_factory=dict, repr=False
+    )
+
+    @property
+    def raster(self) -> Raster:
+        return self.correction.raster
+
+    @property
+    def images(self) -> tuple[str, ...]:
+        """Names of the images."""
+        return ("measured", "corrected", "half_width")
+
+    @property
+    def times(self) -> Array:
+        return np.asarray(self.correction.data["time"].values, np.float64)
+
+    def kelvins(self, index: int) -> Array:
+        return np.asarray(self.correction.data["measured"][index].values, np.float64)
+
+    @property
+    def notes(self) -> Notes:
+        """Assumptions and warnings."""
+        return self.correction.notes
+
+    def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
+        """Return the frame that began nearest to the state's start."""
+        raster, index = self.raster, self.frame(state)
+        if index not in self._last:
+            corrected = Corrected(self.correction, frame=index)
+            measured = corrected.data["measured"].values
+            data = xr.Dataset(
+                {"measured": (("y", "x"), measured), "flagged": (("y", "x"), np.isnan(measured))}
+            )
+            self._last = {index: (corrected, data, measured_panel(data, raster))}
+        corrected, data, panel = self._last[index]
+        picture = Picture(
+            state, raster, data, {"measured": panel}, lines_of(state, raster, data), {},
+            corrected=corrected,
+        )  # fmt: skip
+        return with_correction(picture, corrected, ("corrected", "half_width"))
+
+    def measurement_of(self, picture: Picture) -> None:
+        """Return nothing: a correction states no radiance."""
+
+    def numbers(self, picture: Picture) -> dict[str, float]:
+        """Return the measured temperature at the cursor in K."""
+        return values_at(picture.data, picture.raster, picture.state.cursor)
