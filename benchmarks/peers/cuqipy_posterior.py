@@ -58,8 +58,8 @@ def case():
 def ours():
     """Return mean and standard deviation of each part by the correction's own solver."""
     posterior = case()
-    mean = posterior.x + posterior.refined(posterior.gradient, 1e-9)
-    covariance = posterior.refined(np.eye(mean.size), 1e-6)
+    mean = posterior.x + posterior.solved(posterior.gradient, 1e-9)
+    covariance = posterior.solved(np.eye(mean.size), 1e-6)
     return mean, np.sqrt(np.diag(covariance))
 
 
