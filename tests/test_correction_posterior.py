@@ -229,7 +229,7 @@ def test_the_posterior_is_that_of_dense_matrices():
     for cell in (0, 500, 1111, 1400, 2303):
         right = np.zeros(order.size)
         right[order[cell]] = 1.0
-        column = found.refined(right, 1e-9)[order]
+        column = found.solved(right, 1e-9)[order]
         # The light of 2.4e-4 changes no quadratic form of the data by more than twice as much.
         assert (np.abs(column - covariance[cell]) < 5e-4 * spread[cell] * spread).all()
 

@@ -14,10 +14,8 @@ from scipy.ndimage import distance_transform_edt
 from scipy.sparse.linalg import splu
 
 from chipglow.camera import ImageFormation
-from chipglow.correction.batch_formation import BatchFormation, SingleFormation, batch_formation
 from chipglow.correction.beyond import Beyond
 from chipglow.correction.cells import CELLS_PER_PIXEL, Parts
-from chipglow.correction.hessian import RIDGE, Hessian
 from chipglow.correction.prior import Curvature
 from chipglow.quantities import Array
 
@@ -36,12 +34,8 @@ or mean in units of its standard uncertainty. Per pixel it is about the root mea
 the pixels.
 """
 
-_ROUGH_ERROR: Final = 0.1
-"""The same for solutions from which only weights or positions of outlines follow.
-
-It adds 1 % to the mean squares of which the weights are the inverse, and the fit of an outline
-allows for what remains of the gradient.
-"""
+_ROUGH_ERROR: Final = 1e-2
+"""The same for solutions from which only weights or positions of outlines follow."""
 
 _STEP_TOLERANCE: Final = 3e-2
 """Error of a step relative to the step at which it suffices: the next one corrects it."""
@@ -56,8 +50,14 @@ _CHANGE_TOLERANCE: Final = 1e-5
 """Relative error of a change by a single error, which may be many standard uncertainties: for an
 emissivity that is off by 5 %, at an NETD of 0.1 K, 1e-3 left 12 % in a pixel, 1e-4 1 %."""
 
+_MOST_ITERATIONS: Final = 200
+"""Most iterations of conjugate gradients."""
+
 _BLURRED_WEIGHT: Final = 0.5
 """Weight of the data in the preconditioner, which has no blur: blur halves about this part."""
+
+_RIDGE: Final = 1e-8
+"""Weak weight of all values, so that parts without data and without neighbours are determined."""
 
 _START_CURVATURE: Final = 0.02
 """Standard deviation of curvatures before they are known: 2 % of the radiance."""
@@ -131,11 +131,6 @@ class Problem:
         """Set the weights of the prior by the variances of the curvatures."""
         self.weights, matrix = 1 / variances, self.curvature.matrix
         self.bending = sparse.csr_array(matrix.T @ sparse.diags_array(self.weights) @ matrix)
-
-    @cached_property
-    def batch(self) -> BatchFormation | SingleFormation:
-        """The formation of the images of many fields."""
-        return batch_formation(self.formation)
 
     @cached_property
     def shine(self) -> Array:
@@ -261,34 +256,18 @@ class Posterior:
         light = self.light_change @ change
         return self.problem.formation.forward(light.reshape(self.problem.parts.cells.shape))
 
-    @cached_property
-    def hessian(self) -> Hessian:
-        """The negative second derivative of the logarithm of the density."""
-        problem = self.problem
-        return Hessian(
-            problem.formation,
-            problem.batch,
-            self.light_change,
-            self.pixel_weights,
-            self.bending,
-            self.preconditioner,
-        )
-
-    def error_of(self, per_pixel: float) -> float:
-        """Return the error of a solution in standard uncertainties from one per pixel."""
-        return per_pixel * float(np.sqrt(np.count_nonzero(self.pixel_weights)))
-
     def solved(self, right: Array, error: float, relative: float = 0.0) -> Array:
-        """Solve with the approximate Hessian; `right` is (part,) or (part, error).
+        """Solve with the Hessian; `right` is (part,) or (part, error).
 
         The solution ends at an `error` per pixel in standard uncertainties, or at one `relative`
         to the solution.
         """
-        return self.hessian.solved(right, self.error_of(error), relative)
-
-    def refined(self, right: Array, error: float, relative: float = 0.0) -> Array:
-        """Solve as `solved` with the exact Hessian."""
-        return self.hessian.refined(right, self.error_of(error), relative)
+        columns = right.reshape(self.x.size, -1)
+        least = error * np.sqrt(np.count_nonzero(self.pixel_weights))
+        solution = _conjugate_gradients(
+            self._product, self.preconditioner.solve, columns, least, relative
+        )
+        return solution.reshape(right.shape)
 
     def noise_response(self, generator: np.random.Generator) -> Array:
         """Return the right side of `solved` for a draw of the noise."""
@@ -308,16 +287,26 @@ class Posterior:
         responses = [
             self.noise_response(generator) + self.prior_response(generator) for _ in range(count)
         ]
-        return _in_threads(lambda block: self.solved(block, error), responses)
+        return self._solved_all(responses, error)
 
     def drawn_all(self, right_sides: Sequence[Array]) -> Array:
         """Return the changes of the solution for drawn right sides, (draw, part)."""
-        return _in_threads(lambda block: self.solved(block, _DRAW_ERROR), right_sides)
+        return self._solved_all(right_sides, _DRAW_ERROR)
 
     def changed_all(self, images: Iterable[Array], relative: float = _CHANGE_TOLERANCE) -> Array:
         """Return the changes of the solution with changes of the measured radiance."""
         responses = [self.response(image) for image in images]
-        return _in_threads(lambda block: self.refined(block, _STEP_ERROR, relative), responses)
+        return self._solved_all(responses, _STEP_ERROR, relative)
+
+    def _solved_all(
+        self, right_sides: Sequence[Array], error: float, relative: float = 0.0
+    ) -> Array:
+        """Solve for right sides together, a part of them in each thread."""
+        columns = np.stack(right_sides, axis=1)
+        blocks = np.array_split(columns, min(get_num_threads(), columns.shape[1]), axis=1)
+        with ThreadPoolExecutor(len(blocks)) as pool:
+            solved = pool.map(lambda block: self.solved(block, error, relative), blocks)
+            return np.concatenate(list(solved), axis=1).T
 
     def bias(self) -> Array:
         """Return the decrease of the solution by the prior, estimated from the solution, (part,).
@@ -325,7 +314,7 @@ class Posterior:
         Added once, it halves the order of the bias (iterated regularisation; Engl, Hanke and
         Neubauer, Regularization of Inverse Problems, 5.1).
         """
-        return self.refined(self.bending @ self.x, _STEP_ERROR)
+        return self.solved(self.bending @ self.x, _STEP_ERROR)
 
     def _sent_back(self, image: Array) -> Array:
         """Return the adjoint of `seen_change`."""
@@ -343,6 +332,15 @@ class Posterior:
     def _light(self, sent: Array) -> Array:
         return np.asarray(self.spread @ sent).reshape(self.problem.parts.cells.shape)
 
+    def _product(self, changes: Array) -> Array:
+        """Return the Hessian times changes of the solution, (part, error)."""
+        formation, shape = self.problem.formation, self.problem.parts.cells.shape
+        light = self.light_change @ changes
+        for number, column in enumerate(light.T):
+            image = self.pixel_weights * formation.forward(column.reshape(shape))
+            light[:, number] = formation.adjoint(image).ravel()
+        return np.asarray(self.light_change.T @ light + self.bending @ changes + _RIDGE * changes)
+
     def factor(self) -> Any:
         """Return factors of the Hessian without blur, which couples the parts of a pixel only."""
         parts = self.problem.parts
@@ -356,7 +354,7 @@ class Posterior:
         reach = np.bincount(parts.pixel, parts.area * cells[parts.cell], self.pixel_weights.size)
         weights = _BLURRED_WEIGHT * reach**2
         data = image.T @ sparse.diags_array(weights) @ image
-        whole = sparse.csc_array(self.bending + data + RIDGE * sparse.eye_array(parts.size))
+        whole = sparse.csc_array(self.bending + data + _RIDGE * sparse.eye_array(parts.size))
         return splu(
             whole,
             permc_spec="MMD_AT_PLUS_A",
@@ -365,9 +363,30 @@ class Posterior:
         )
 
 
-def _in_threads(solve: Callable[[Array], Array], right_sides: Sequence[Array]) -> Array:
-    """Solve for right sides together, a part of them in each thread; return (error, part)."""
-    columns = np.stack(right_sides, axis=1)
-    blocks = np.array_split(columns, min(get_num_threads(), columns.shape[1]), axis=1)
-    with ThreadPoolExecutor(len(blocks)) as pool:
-        return np.concatenate(list(pool.map(solve, blocks)), axis=1).T
+def _conjugate_gradients(
+    product: Callable[[Array], Array],
+    precondition: Callable[[Array], Array],
+    right: Array,
+    error: float,
+    relative: float,
+) -> Array:
+    """Solve for the columns of `right` in step, each to an error in the preconditioner's norm."""
+    solution, residual = np.zeros_like(right), right.copy()
+    active = np.arange(right.shape[1])
+    direction, before, target = np.zeros_like(right), np.ones(active.size), np.zeros(active.size)
+    for iteration in range(_MOST_ITERATIONS):
+        preconditioned = precondition(residual[:, active])
+        squares = (residual[:, active] * preconditioned).sum(axis=0)
+        if iteration == 0:
+            target = np.maximum(error**2, relative**2 * squares)
+        remains = squares > target[active]
+        if not remains.any():
+            break
+        active, squares, before = active[remains], squares[remains], before[remains]
+        direction = preconditioned[:, remains] + direction[:, remains] * (squares / before)
+        image = product(direction)
+        step = squares / (direction * image).sum(axis=0)
+        solution[:, active] += step * direction
+        residual[:, active] -= step * image
+        before = squares
+    return solution
