@@ -66,6 +66,8 @@ class DrawnPlaces:
             for group, tool in zip(groups[1:], tools, strict=True):
                 group.append(tool)
                 one.add_tools(tool)
+            # None of them is active before it is chosen: a press moves cursor and view.
+            one.toolbar.update(active_drag=None, active_tap=None)
             one.on_event(SelectionGeometry, self._on_geometry)
         self._handles.on_change("data", self._on_handles)
         self._points.on_change("data", self._on_point)
