@@ -418,6 +418,7 @@ def test_a_measurement_becomes_an_image():
     assert "acts twice" in told.notes.assumed[1]
 
 
+@pytest.mark.slow
 def test_symmetric_edges_are_not_called_curved_and_a_known_curve_is():
     """Of 12 standard normal numbers, one is beyond 4 with a probability of 0.08 %."""
     edges = [GAUSSIAN, tailed_edge(8e-6, 0.2, 20e-6), disc_edge(12e-6)]

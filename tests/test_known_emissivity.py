@@ -118,6 +118,7 @@ def emissivity_file(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_a_map_gives_the_temperature_of_textured_pixels(emissivity_file):
     image, kelvins = seen(texture(), 800.0, seed=2), 800.0
     image_map = read_emissivity_map(emissivity_file)
@@ -203,6 +204,7 @@ def folder(tmp_path, monkeypatch, emissivity_file):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_command_takes_what_the_laboratory_writes(folder):
     psf = "correct chip.nc --psf psf.nc --noise 0.2K --regions regions.yaml"
     chipglow(*f"{psf} --frame 0 --map emissivity.nc --out map.nc".split())

@@ -210,6 +210,7 @@ def test_defaults_that_are_not_the_papers_are_said_to_be_chipglows():
     assert others.startswith("chipglow's defaults") and "detector.bits 12" in others
 
 
+@pytest.mark.slow
 def test_the_paper_stands_beside_its_own_study_only(chip_analysis, undrawn, tmp_path):
     titanium = Study(**TITANIUM)
     assert all(row.published is None for row in result_rows(chip_analysis, titanium))

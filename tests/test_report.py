@@ -116,6 +116,7 @@ def page(folder):
     return Page((folder / "report.html").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_columns_of_panels_are_separate_images_that_together_show_the_figure(folder):
     text = (folder / "report.html").read_text(encoding="utf-8")
     for name, columns in (
