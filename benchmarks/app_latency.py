@@ -23,7 +23,7 @@ from common import arguments
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 
-from camera_files import ptw
+from camera_files import CALIBRATION, ptw
 
 CHROMIUM = os.environ.get("CHIPGLOW_CHROMIUM") or shutil.which("chromium")
 FLAGS = [
@@ -57,14 +57,6 @@ WATCH = """() => {
 }"""
 
 
-CALIBRATION = """\
-model: linear
-band: 3.8-5.1 um
-lowest: 50 degC
-highest: 1500 degC
-parameters: {offset: 500.0, gain: 10.0}
-covariance: [[25.0, 0.0], [0.0, 1.0e-4]]
-"""
 NUMBERS = """() => {
   window.clicked = [];
   let asked = 0;

@@ -14,6 +14,16 @@ OBJECT = {"emissivity": 0.95, "reflected": 295.15, "atmosphere": 292.15, "window
 START = 1_700_000_000
 STAMPS = 0.033 * np.arange(FRAMES)
 
+CALIBRATION = """\
+model: linear
+band: 3.8-5.1 um
+lowest: 50 degC
+highest: 1500 degC
+parameters: {offset: 500.0, gain: 10.0}
+covariance: [[25.0, 0.0], [0.0, 1.0e-4]]
+"""
+"""A linear calibration of counts in YAML."""
+
 
 def pictures(frames=FRAMES, bits=14):
     """Smooth pictures with noise in which each pixel and frame differs."""

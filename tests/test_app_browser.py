@@ -36,15 +36,6 @@ pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium, which is not installed"),
 ]
 
-CALIBRATION = """\
-model: linear
-band: 3.8-5.1 um
-lowest: 50 degC
-highest: 1500 degC
-parameters: {offset: 500.0, gain: 10.0}
-covariance: [[25.0, 0.0], [0.0, 1.0e-4]]
-"""
-
 EXACT = re.compile("^Exact picture")
 
 
@@ -361,7 +352,7 @@ def test_a_camera_file_is_dropped_asked_for_and_corrected(visit, tmp_path):
     image = 5000 + 6000 * np.exp(-((x - 30) ** 2 + (y - 20) ** 2) / 2 / 8**2)
     images = np.stack([image + 40 * number for number in range(4)]).astype(np.uint16)
     (tmp_path / "run.ptw").write_bytes(camera_files.ptw(images))
-    (tmp_path / "cal.yaml").write_text(CALIBRATION)
+    (tmp_path / "cal.yaml").write_text(camera_files.CALIBRATION)
     page = visit()
     page.set_viewport_size({"width": 1400, "height": 900})
     page.locator("input[type=file]").set_input_files(tmp_path / "run.ptw")

@@ -21,14 +21,6 @@ from chipglow.quantities import ZERO_CELSIUS
 
 pytest.importorskip("panel", reason="needs the extra app")
 
-CALIBRATION = """\
-model: linear
-band: 3.8-5.1 um
-lowest: 50 degC
-highest: 1500 degC
-parameters: {offset: 500.0, gain: 10.0}
-covariance: [[25.0, 0.0], [0.0, 1.0e-4]]
-"""
 KELVINS = {"unit": "0.1 K", "interval": "1 ms", "pitch": "15 um", "band": "3.8-5.1 um"}
 
 
@@ -41,7 +33,7 @@ def spot(frames=6, rows=40, columns=60):
 
 @pytest.fixture
 def ptw(tmp_path):
-    (tmp_path / "cal.yaml").write_text(CALIBRATION)
+    (tmp_path / "cal.yaml").write_text(camera_files.CALIBRATION)
     path = tmp_path / "run.ptw"
     path.write_bytes(camera_files.ptw(spot()))
     return path, {"pitch": "15 um", "calibration": str(tmp_path / "cal.yaml")}

@@ -420,16 +420,16 @@ def test_a_measurement_becomes_an_image():
 
 @pytest.mark.slow
 def test_symmetric_edges_are_not_called_curved_and_a_known_curve_is():
-    """Of 12 standard normal numbers, one is beyond 4 with a probability of 0.08 %."""
+    """Of 30 standard normal numbers, one is beyond 4 with a probability of 0.2 %."""
     edges = [GAUSSIAN, tailed_edge(8e-6, 0.2, 20e-6), disc_edge(12e-6)]
     scores = []
-    for seed in range(4):
+    for seed in range(10):
         for edge in edges:
             found = knife_edge([an_image(3.0 + seed, edge, 0.05, seed)])
             scores.append(_asymmetry(found))
     z = [one.value / one.standard_uncertainty for one in scores]
-    assert max(map(abs, z)) < 4  # four standard deviations of all scores
-    assert np.std(z) < 1.4  # the standard deviation of that of 12 numbers is 0.2
+    assert max(map(abs, z)) < 4  # four standard deviations of all scores; 2.2 measured
+    assert np.std(z) < 1.3  # 0.93 measured; it scatters by 1 / sqrt(2 n)
     assert not any(one.is_clear for one in scores)
     # E + q 4 E (1 − E): the curve is in part a shift of the edge, which takes away some of q.
     fraction = edge_radiance(GAUSSIAN, 5.0, background=0.0, step=1.0)

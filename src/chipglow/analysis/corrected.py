@@ -113,7 +113,7 @@ def corrected_windows(
     for surface in dict.fromkeys(read.values()):
         frame = frames[surface]
         (rows, columns), _ = _window(frame.raster, segment)
-        measurement = Measurement(frame.data.isel(y=rows, x=columns)).with_tool(segment.tool)
+        measurement = frame.part(rows=rows, columns=columns).with_tool(segment.tool)
         uncertainty = plan.emissivity.get(surface, _found(surface, heated))
         known = observed_scene(scene, camera, surfaces[surface], segment.start, uncertainty)
         result = correct(

@@ -47,9 +47,8 @@ def explore(scene: "Scene | str | Path | None" = None, study: "Study | None" = N
             f"{opened.path}: is neither a scene nor a measurement; convert it by chipglow convert "
             "or import, or open it in chipglow app"
         )
-    pn.extension(
-        "tabulator", inline=True
-    )  # its scripts come with it: nothing is loaded from the network
+    # Its scripts come with it: nothing is loaded from the network.
+    pn.extension("tabulator", inline=True)
     view = PageView(opened, embedded=True)
     view.start(None)
     return view.page

@@ -58,7 +58,7 @@ def picture_file(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from chipglow.drawing.drawing import style
+    from chipglow.drawing.drawing import DPI, style
     from chipglow.drawing.scales import GREY
 
     left, right, bottom, top = (1e6 * edge for edge in raster.extent)
@@ -96,5 +96,5 @@ def picture_file(
         axes.set(xlabel="x / µm", ylabel="y / µm")
         file = BytesIO()
         metadata: dict[str, Any] = {"Software": f"chipglow {__version__}", **settings}
-        figure.savefig(file, dpi=150, metadata=metadata)
+        figure.savefig(file, dpi=DPI, metadata=metadata)
     return file.getvalue()

@@ -36,7 +36,6 @@ from chipglow.text import Notes
 REFERENCE: Final = "reference_temperature"
 """Variable of a measurement that the app saved: the reference of its pixels in K."""
 
-
 _KEPT: Final = 8
 """Corrections that a page keeps."""
 
@@ -194,7 +193,7 @@ class MeasurementModel(_FramesModel):
         camera = self._camera(study, measurement)
         whole = Zone("image", study.emissivity, None, study.emissivity_uncertainty)
         result = correct(
-            Measurement(measurement.data.isel(y=rows, x=columns)),
+            measurement.part(rows=rows, columns=columns),
             camera,
             [whole],
             surroundings=surroundings_of(camera),
@@ -237,8 +236,7 @@ class MeasurementModel(_FramesModel):
         frame = self.measured.measurement(self.frame(picture.state))
         if frame.calibration_errors is not None:
             row, column = pixel_at(picture.raster, picture.state.cursor)
-            pixel = Measurement(frame.data.isel(y=[row], x=[column]))
-            pixel.band = frame.band  # which has its table of radiance already
+            pixel = frame.part(rows=slice(row, row + 1), columns=slice(column, column + 1))
             values = np.full((1, 1, 1), numbers["measured"])
             estimate = pixel.estimate(values, pixel.calibration_effects(0)[None])
             numbers["uncertainty"] = float(estimate.standard_uncertainty[0, 0, 0])

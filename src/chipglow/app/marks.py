@@ -11,7 +11,7 @@ from chipglow.laboratory.emissivity.places import KnownEmissivity
 from chipglow.quantities import Array
 from chipglow.quantities.units import KELVINS, POSITION
 from chipglow.scene import Circle, Pixel, Polygon, Polyline, Raster, Region
-from chipglow.scene.regions import Point
+from chipglow.scene.regions import Point, named_value
 from chipglow.text.template import yaml_line
 
 Kind: TypeAlias = Literal["point", "line", "box", "circle", "polygon"]
@@ -149,8 +149,7 @@ def marks_of(described: PlacesDescription, raster: Raster) -> Iterator[Mark]:
     """Yield the places of a file; ValueError for one that is not in the image."""
     for place in described.places():
         place.mask(raster)
-        known = described.emissivities
-        emissivity = known.get(place.name, known.get(place.feature))
+        emissivity = named_value(described.emissivities, place)
         feature = "" if place.feature == place.name else place.feature
         yield Mark(place.name, *_drawn(place, raster), emissivity, feature)
 

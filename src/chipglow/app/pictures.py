@@ -17,7 +17,7 @@ from chipglow.correction import Correction
 from chipglow.drawing.scales import HEAT, PLAIN, SIGNED, ends, round_limit
 from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 from chipglow.scene import Raster, Tool, sample
-from chipglow.scene.lines import nearest
+from chipglow.scene.lines import nearest, nearest_sample
 
 _STEP: Final = 16
 """Pixels by which this part follows the cursor, so that few moves need a new correction."""
@@ -235,9 +235,8 @@ def unflagged(data: xr.Dataset, image: xr.DataArray) -> Array:
 
 def pixel_at(raster: Raster, at: tuple[float, float]) -> tuple[int, int]:
     """Return row and column of the pixel at x and y in m."""
-    row = int((raster.top - at[1]) / raster.spacing)
-    column = int((at[0] - raster.left) / raster.spacing)
-    return min(max(row, 0), raster.rows - 1), min(max(column, 0), raster.columns - 1)
+    row, column = nearest_sample(raster, at)
+    return int(row.clip(0, raster.rows - 1)), int(column.clip(0, raster.columns - 1))
 
 
 def values_at(data: xr.Dataset, raster: Raster, at: tuple[float, float]) -> dict[str, float]:

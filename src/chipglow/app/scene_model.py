@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import ceil, nan, sqrt
 from typing import Any, ClassVar, Final, TypeAlias, TypeVar, cast, get_args
 
@@ -56,35 +57,26 @@ from chipglow.radiometry import ObjectParameters
 from chipglow.scene import Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 from chipglow.study import fit
+from chipglow.study.fitting import Fitted
 from chipglow.surface import Surface
 from chipglow.text import Notes
 
 _Exposed: TypeAlias = tuple[ExposedChain, ExposedChain | None]
-
-
 _Result = TypeVar("_Result")
-
 
 DISPLAYED: Final = 100_000
 """Samples of the image of the scene on the page."""
 
-
 _SURFACE: Final = ("surface", "seed")
-
-
 _EXPOSURE: Final = (
     *_SURFACE, "start", "analysis.reference",
     "camera.band", "camera.integration_time", "camera.reflected",
 )  # fmt: skip
-
-
 _ROLLING: Final = (*_EXPOSURE, "camera.pitch", "camera.offset")
 """Beginnings of the paths of controls that change surface and exposure."""
 
-
 _HALF: Final = 24
 """Half the side in pixels of the part that is corrected: a correction takes 3 ms a pixel."""
-
 
 _KEPT: Final[Mapping[str, int]] = {
     "errors": 8,
@@ -100,7 +92,6 @@ _KEPT: Final[Mapping[str, int]] = {
     "field": 6,
 }
 """Number of kept results by stage: few of large results, many of small or slow ones."""
-
 
 _HARDLY_LARGER: Final = 1.5
 """Size of a pixel, in coarse samples, below which a quick look takes half as long."""
@@ -121,12 +112,15 @@ class SceneFrames:
 
     def kelvins(self, index: int) -> Array:
         """Return the radiance temperature of a frame in K, shape (y, x); NaN out of range."""
-        fitted = fit(self.state.study, self.scene)
-        (surface,) = fitted.surfaces.values()
-        measured = self._camera.measure(fitted.scene, surface, float(self.times[index]))
+        (surface,) = self._fitted.surfaces.values()
+        measured = self._camera.measure(self._fitted.scene, surface, float(self.times[index]))
         return np.asarray(measured.radiance_temperature()[0])
 
-    @property
+    @cached_property
+    def _fitted(self) -> Fitted:
+        return fit(self.state.study, self.scene)
+
+    @cached_property
     def _camera(self) -> Camera:
         study = self.state.study
         return study.camera.on(self.scene.raster, study.seed)
@@ -244,10 +238,10 @@ class SceneModel:
             start, known = exposure.start, state.study.emissivity_uncertainty
             observed = observed_scene(scene, camera, surface, start, known)
             check(0.0)
-            data = camera.form_measurement(exposure).data
+            measurement = camera.form_measurement(exposure)
             rows, columns = around_cursor(state, picture.raster, _HALF)
             result = correct(
-                Measurement(data.isel(y=rows, x=columns)),
+                measurement.part(rows=rows, columns=columns),
                 camera,
                 observed,
                 surroundings=surroundings_of(camera),

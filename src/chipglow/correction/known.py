@@ -8,6 +8,7 @@ from chipglow.correction.zones import Zone
 from chipglow.laboratory.emissivity import EmissivityLine
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Region, Tool
+from chipglow.scene.regions import named_value
 
 TOOL: Final = "tool"
 """Name of the tool's emissivity and zone."""
@@ -100,7 +101,7 @@ def known_parts(
         )
     parts = [KnownPart(elsewhere or ELSEWHERE, named.get(elsewhere or ELSEWHERE))]
     for region in regions:
-        line = named.get(region.name, named.get(region.feature))
+        line = named_value(named, region)
         parts.append(KnownPart(region.name, line, region))
     if tool is not None:
         parts.append(KnownPart(TOOL, named[TOOL], tool))

@@ -26,7 +26,7 @@ from chipglow.laboratory.emissivity import EmissivityLine, reflected_temperature
 from chipglow.laboratory.emissivity.temperature import FAR
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.quantities.units import COLDEST
-from chipglow.radiometry import Band
+from chipglow.radiometry import Band, blackbody_radiance
 from chipglow.scene import Raster, Region, Tool
 from chipglow.surface import MapSurface
 from chipglow.text import Notes
@@ -241,7 +241,7 @@ class _Frames:
                 if progress is not None:
                     progress((before + fraction) / count)
 
-            found.append(self._frame(Measurement(measurement.data.isel(time=[frame])), tell))
+            found.append(self._frame(measurement.part(slice(frame, frame + 1)), tell))
         return joined(found)
 
     def _frame(self, image: Measurement, progress: _Progress) -> Correction:
@@ -268,7 +268,7 @@ class _Frames:
         reflected = float(image.band.radiance(float(self.room.values)))
         for _ in range(_ROUNDS):
             emissivity = np.clip(value + slope * (found - at), _LEAST, 1.0)
-            own = (seen - (1 - emissivity) * reflected) / emissivity
+            own = blackbody_radiance(seen, emissivity, reflected)
             found = np.asarray(image.band.temperature(np.maximum(own, reflected)))
         return np.asarray(found, np.float64)
 

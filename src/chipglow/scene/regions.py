@@ -1,9 +1,9 @@
 """Places of an image with names: points, lines, and regions such as polygons and circles."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Final, Literal, TypeAlias
+from typing import Final, Literal, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,7 @@ from chipglow.scene.lines import Line, nearest_sample, polyline
 from chipglow.scene.raster import Raster
 
 Point: TypeAlias = tuple[float, float]
+Value = TypeVar("Value")
 """Column and row in pixels from the image's upper left corner, or x and y in m."""
 
 _CIRCLE_POINTS: Final = 72
@@ -220,6 +221,11 @@ class Area(Brief):
     mask: NDArray[np.bool_]
     whole: bool
     """Whether it is all that there is of the feature."""
+
+
+def named_value(values: Mapping[str, Value], place: Region | Area) -> Value | None:
+    """Return the value of a place by its name, or else by its feature; None without one."""
+    return values.get(place.name, values.get(place.feature))
 
 
 def areas(regions: Sequence[Region], raster: Raster) -> tuple[Area, ...]:

@@ -57,7 +57,7 @@ def correct_study(
             observed = observed_scene(scene, camera, surfaces[name], start, emissivity_uncertainty)
             corrected.append(
                 correct(
-                    Measurement(measurement.data.isel(time=[frame])),
+                    measurement.part(slice(frame, frame + 1)),
                     camera,
                     observed,
                     psf_uncertainty=psf_uncertainty,

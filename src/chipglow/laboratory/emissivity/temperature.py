@@ -32,6 +32,7 @@ from chipglow.quantities import SEED, ZERO_CELSIUS, Array, Brief
 from chipglow.quantities.units import HOTTEST
 from chipglow.radiometry import Band, blackbody_radiance
 from chipglow.scene import Area, Region, areas
+from chipglow.scene.regions import named_value
 from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Estimate, Limits, MonteCarlo, monte_carlo, propagate
 
@@ -245,7 +246,7 @@ def true_temperatures(
     places = areas(regions, measurements[0].raster)
     if isinstance(emissivities, EmissivityLine):
         emissivities = dict.fromkeys((area.name for area in places), emissivities)
-    named = {area: emissivities.get(area.name, emissivities.get(area.feature)) for area in places}
+    named = {area: named_value(emissivities, area) for area in places}
     known = {area: line for area, line in named.items() if line is not None}
     if not known:
         raise ValueError(

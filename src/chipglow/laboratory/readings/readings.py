@@ -15,6 +15,7 @@ from chipglow.laboratory.emissivity import EmissivityLine, true_temperature
 from chipglow.laboratory.emissivity.observations import deviation_of
 from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 from chipglow.scene import Area, Circle, Pixel, Polygon, Polyline, Region
+from chipglow.scene.regions import named_value
 from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Estimate
 
@@ -146,7 +147,7 @@ def read_places(
     def line_of(place: Region) -> EmissivityLine | None:
         if emissivities is None or isinstance(emissivities, EmissivityLine):
             return emissivities
-        return emissivities.get(place.name, emissivities.get(place.feature))
+        return named_value(emissivities, place)
 
     masks = [place.mask(image.raster) for place in places]
     rows = (
