@@ -156,8 +156,7 @@ class PlacesDescription(Part):
         known = {*names, *(place.feature for place in places)}
         for name in self.emissivities.keys() - known:
             raise ValueError(
-                f"emissivities: {name!r} is no place or feature, "
-                f"expected one of {', '.join(known)}"
+                f"emissivities: {name!r} is no place or feature, expected one of {', '.join(known)}"
             )
 
     def places(self) -> tuple[Region, ...]:
