@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
-from math import sqrt
 from typing import Any, Final
 
 import numpy as np
@@ -45,6 +44,9 @@ _MODEL_ERROR: Final = 3e-4
 Images of analytic fields by cells of half a pixel differ by 0.01 K to 0.07 K from those by samples
 of a twenty-fourth of a pixel: up to 3e-4 of the radiance.
 """
+
+_READINGS: Final = 256
+"""Readings below the range of which the mean is taken; an integral, to 1 %."""
 
 _OUTLINE_ROUNDS: Final = 8
 """Most rounds in which the outlines move to fit the image."""
@@ -215,13 +217,15 @@ def _corrected(
     progress: Callable[[float], None],
 ) -> _Frame:
     """Solve one frame, and propagate the uncertainties."""
-    inside, notes = _image(measurement, frame, camera, noise)
-    image, pixels = inside.extended(_MARGIN), measurement.raster.widened(_MARGIN)
+    room = float(known.surroundings.values)
+    inside, notes = _image(measurement, frame, camera, noise, room)
+    image = inside.extended(_MARGIN)
     fit, former = None, None
     if known.outline_uncertainty:
-        known, fit, former = _located(image, camera, known, pixels, lambda: progress(0.0))
-    problem = _problem(image, camera, known, pixels)
-    problem.beyond = Beyond.of(known.observed, problem.parts, problem.formation, measurement.raster)
+        known, fit, former = _located(
+            image, camera, known, measurement.raster, lambda: progress(0.0)
+        )
+    problem = _problem_and_beyond(image, camera, known, measurement.raster)
     posterior = problem.solve(generator, lambda: progress(0.0), former)
     progress(0.5)
     bias = posterior.bias()
@@ -263,7 +267,7 @@ def _added(one: Motion, other: Motion) -> Motion:
 
 
 def _image(
-    measurement: Measurement, frame: int, camera: Camera, noise: float | None
+    measurement: Measurement, frame: int, camera: Camera, noise: float | None, coldest: float
 ) -> tuple[Image, Notes]:
     """Return a frame as data: flagged pixels become bounds, or are missing."""
     flags, radiance = measurement.flags[frame], measurement.radiance[frame]
@@ -276,14 +280,25 @@ def _image(
     limit = measurement.data.attrs.get("lower_limit")
     lowest = float(radiance[usable].min())
     least = lowest if limit is None else float(measurement.band.radiance(float(limit)))
-    # Below the range, any radiance from 0 to the limit is equally probable.
-    known = np.where(under, least / 2, radiance)
+    below, doubt = _below_range(measurement.band, least, coldest)
+    known = np.where(under, below, radiance)
     missing |= ~np.isfinite(known)
     deviation, notes = noise_of(measurement, frame, usable, noise)
-    deviation = np.where(under, least / sqrt(12), deviation)
+    deviation = np.hypot(deviation, np.where(under, doubt, 0.0))
     received, gain = _received(np.where(missing, lowest, known), camera, measurement.raster)
     spread = np.hypot(deviation / gain, _MODEL_ERROR * np.abs(received))
     return Image(received, spread, under & ~missing, saturated & ~missing, missing), notes
+
+
+def _below_range(band: Band, limit: float, coldest: float) -> tuple[float, float]:
+    """Return mean and standard deviation of the radiance of pixels below a limit of radiance.
+
+    Any reading in K between the coldest one and the limit is equally probable.
+    """
+    highest = float(band.temperature(limit))
+    readings = np.linspace(min(coldest, highest), highest, _READINGS)
+    radiance = band.radiance(readings)
+    return float(radiance.mean()), float(radiance.std())
 
 
 def _received(displayed: Array, camera: Camera, pixels: Raster) -> tuple[Array, Array]:
@@ -297,14 +312,15 @@ def _received(displayed: Array, camera: Camera, pixels: Raster) -> tuple[Array, 
 
 
 def _located(
-    image: Image, camera: Camera, known: Knowledge, pixels: Raster, check: Callable[[], None]
+    image: Image, camera: Camera, known: Knowledge, inner: Raster, check: Callable[[], None]
 ) -> tuple[Knowledge, OutlineFit, Posterior]:
     """Move the outlines to where the image shows them.
 
     The prior has the same weights everywhere: weights that follow from the data would admit, where
     an outline is wrong, the bends of the radiance that this error causes.
     """
-    posterior = _problem(image, camera, known, pixels).smooth(check)
+    posterior = _problem_and_beyond(image, camera, known, inner).smooth(check)
+    pixels = inner.widened(_MARGIN)
     for _ in range(_OUTLINE_ROUNDS):
         fit = fit_outline(posterior, known)
         observed = known.observed.moved(_added(known.observed.motion, fit.motion))
@@ -315,6 +331,13 @@ def _located(
     return known, fit, posterior
 
 
+def _problem_and_beyond(image: Image, camera: Camera, known: Knowledge, inner: Raster) -> Problem:
+    """Return the problem of an image with a margin around the `inner` pixels, and light beyond."""
+    problem = _problem(image, camera, known, inner.widened(_MARGIN))
+    problem.beyond = Beyond.of(known.observed, problem.parts, problem.formation, inner)
+    return problem
+
+
 def _problem(image: Image, camera: Camera, known: Knowledge, pixels: Raster) -> Problem:
     parts = cut_cells(known.observed, pixels)
     formation = image_formation(camera, parts.cells, pixels=pixels)
@@ -322,7 +345,7 @@ def _problem(image: Image, camera: Camera, known: Knowledge, pixels: Raster) -> 
     cells = parts.cells.rows * parts.cells.columns
     mirrored = np.bincount(parts.cell, parts.area * (1 - parts.emissivity), cells)
     reflected = room * formation.forward(mirrored.reshape(parts.cells.shape))
-    return Problem(image, parts, formation, reflected)
+    return Problem(image, parts, replace(formation, beyond="nothing"), reflected)
 
 
 def _correction_of(

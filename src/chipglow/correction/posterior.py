@@ -16,15 +16,21 @@ from scipy.sparse.linalg import splu
 from chipglow.camera import ImageFormation
 from chipglow.correction.beyond import Beyond
 from chipglow.correction.cells import CELLS_PER_PIXEL, Parts
-from chipglow.correction.prior import Curvature
+from chipglow.correction.prior import Curvature, slopes_within
 from chipglow.quantities import Array
 
-_LARGEST_STEP: Final = 0.7
-"""Largest change of the logarithm of radiance in one step: a factor of two."""
+_LARGEST_STEP: Final = 2.0
+"""Largest change of the logarithm of radiance in one step: a factor of seven.
+
+A longer step is shortened as a whole: if single values were limited, the solution would bend there,
+and the objective would not decrease."""
 
 _STEPS: Final = 20
 """Most steps for each estimate of the weights. Few need more than 4; with these, some scenes ended
 10 K too cold."""
+
+_MOST_HALVINGS: Final = 8
+"""Most halvings of a step that does not decrease the objective; the shortest is 1/128 of it."""
 
 _STEP_ERROR: Final = 2e-3
 """Error at which steps end, per pixel with data, in standard uncertainties by noise and smoothing.
@@ -34,7 +40,7 @@ or mean in units of its standard uncertainty. Per pixel it is about the root mea
 the pixels.
 """
 
-_ROUGH_ERROR: Final = 1e-2
+_ROUGH_ERROR: Final = 0.1
 """The same for solutions from which only weights or positions of outlines follow."""
 
 _STEP_TOLERANCE: Final = 3e-2
@@ -56,11 +62,18 @@ _MOST_ITERATIONS: Final = 200
 _BLURRED_WEIGHT: Final = 0.5
 """Weight of the data in the preconditioner, which has no blur: blur halves about this part."""
 
-_RIDGE: Final = 1e-8
-"""Weak weight of all values, so that parts without data and without neighbours are determined."""
+_RIDGE: Final = 1e-2
+"""Weight of all values of a change, so that parts without data and neighbours are determined: a
+standard deviation of 10 of the logarithm of radiance."""
 
 _START_CURVATURE: Final = 0.02
 """Standard deviation of curvatures before they are known: 2 % of the radiance."""
+
+_SLOPE: Final = 1.0
+"""Standard deviation of slopes per cell, of the logarithm of radiance.
+
+It is five times the slope at a rake face, and bounds those where there are hardly any data.
+"""
 
 _ROUNDS: Final = 3
 """Rounds in which the weights of the prior follow from the solution and its uncertainty."""
@@ -78,7 +91,7 @@ class Image:
     noise: Array
     """Standard deviation in W/(m² sr)."""
     under_range: NDArray[np.bool_]
-    """Pixels below the range; their radiance and noise follow from a uniform distribution."""
+    """Pixels below the range; their radiance and noise follow from what is probable below it."""
     lower_bound: NDArray[np.bool_]
     """Saturated pixels: their radiance is at least the stated one."""
     missing: NDArray[np.bool_]
@@ -106,7 +119,8 @@ class Problem:
     x is the logarithm of the blackbody radiance of each zone at the centres of its cells, C the
     interpolation to the centroids of the parts, a ε the parts' area and emissivity, A the formation
     of the image, D the curvatures within zones. `reflected` is the image of the reflected radiance.
-    A continues the radiance of the edges; with `beyond`, its slopes are continued too.
+    With `beyond`, the light from beyond the parts follows from a former solution. It is not solved
+    for: parts at the edge that stood for all of it would have the influence of many.
     """
 
     image: Image
@@ -114,8 +128,8 @@ class Problem:
     formation: ImageFormation
     reflected: Array
     beyond: Beyond | None = None
-    excess: Array = field(init=False)
-    """Image of the light that the slopes beyond the edges add, by a former solution."""
+    from_beyond: Array = field(init=False)
+    """Image of the light from beyond the parts."""
     curvature: Curvature = field(init=False)
     weights: Array = field(init=False)
     """Weights w of the curvatures."""
@@ -123,14 +137,16 @@ class Problem:
     """Sparse array Dᵀ w D, (part, part)."""
 
     def __post_init__(self) -> None:
-        self.excess = np.zeros_like(self.reflected)
+        self.from_beyond = np.zeros_like(self.reflected)
         self.curvature = Curvature.of(self.parts)
+        self.slopes = sparse.csr_array(slopes_within(self.parts) / _SLOPE)
         self._weigh(np.full(self.curvature.part.size, _START_CURVATURE**2))
 
     def _weigh(self, variances: Array) -> None:
         """Set the weights of the prior by the variances of the curvatures."""
         self.weights, matrix = 1 / variances, self.curvature.matrix
-        self.bending = sparse.csr_array(matrix.T @ sparse.diags_array(self.weights) @ matrix)
+        bending = matrix.T @ sparse.diags_array(self.weights) @ matrix
+        self.bending = sparse.csr_array(bending + self.slopes.T @ self.slopes)
 
     @cached_property
     def shine(self) -> Array:
@@ -151,8 +167,12 @@ class Problem:
         A `former` solution, which may be one with other outlines, is the start.
         """
         if former is None:
-            return self._maximum(self._start(), _ROUGH_ERROR, check)
-        start = former.problem.parts.continued(former.x, self.parts)
+            start = self._start()
+            if self.beyond is not None:
+                self.from_beyond = self.beyond.image(self.beyond.constant(start))
+        else:
+            start = former.problem.parts.continued(former.x, self.parts)
+            self.from_beyond = former.problem.from_beyond
         return self._maximum(start, _ROUGH_ERROR, check)
 
     def solve(
@@ -184,10 +204,8 @@ class Problem:
         if self.beyond is None:
             return posterior.x
         continuation = self.beyond.continuation(posterior.x)
-        x = self.beyond.with_margin(posterior.x, continuation)
-        light = (self.parts.spread(x) @ self.sent(x)).reshape(self.parts.cells.shape)
-        self.excess = self.beyond.excess(continuation, light)
-        return x
+        self.from_beyond = self.beyond.image(continuation)
+        return self.beyond.with_margin(posterior.x, continuation)
 
     def _start(self) -> Array:
         """Return the solution without blur: each cell has the radiance of its pixel."""
@@ -209,9 +227,22 @@ class Problem:
             change = posterior.solved(posterior.gradient, error, _STEP_TOLERANCE)
             if not change.any():
                 break
-            change = change.clip(-_LARGEST_STEP, _LARGEST_STEP)
-            posterior = Posterior(self, posterior.x + change)
+            before, posterior = posterior, self._after(posterior, change)
+            if posterior is before:
+                break
         posterior.preconditioner = factor
+        return posterior
+
+    def _after(self, posterior: "Posterior", change: Array) -> "Posterior":
+        """Return the solution after a step, shortened until the objective decreases.
+
+        It is the former solution if no such step is found.
+        """
+        change = change * min(1.0, _LARGEST_STEP / np.abs(change).max())
+        for halvings in range(_MOST_HALVINGS):
+            after = Posterior(self, posterior.x + change / 2**halvings)
+            if after.objective < posterior.objective:
+                return after
         return posterior
 
 
@@ -222,7 +253,7 @@ class Posterior:
         self.problem, self.x = problem, x
         self.sent = problem.sent(x)
         self.spread = problem.parts.spread(x)
-        self.predicted = self.seen(self.sent) + problem.reflected + problem.excess
+        self.predicted = self.seen(self.sent) + problem.reflected + problem.from_beyond
         self.pixel_weights = problem.image.weights(self.predicted)
         self.prior_weights, self.bending = problem.weights, problem.bending
         sent = sparse.diags_array(self.sent) @ problem.parts.at_centroids
@@ -242,6 +273,12 @@ class Posterior:
         counted = self.pixel_weights > 0
         squares = self.residual[counted] ** 2 * self.pixel_weights[counted]
         return float(squares.mean()) if counted.any() else 0.0
+
+    @cached_property
+    def objective(self) -> float:
+        """½ Σ (y − A g)² / σ² + ½ Σ w (D x)², which the solution minimises."""
+        data = (self.pixel_weights * self.residual**2).sum()
+        return float(data + self.x @ (self.bending @ self.x)) / 2
 
     @property
     def gradient(self) -> Array:
@@ -278,7 +315,9 @@ class Posterior:
         """Return the right side of `solved` for a draw of the curvatures."""
         curvatures = generator.standard_normal(self.prior_weights.size)
         matrix = self.problem.curvature.matrix
-        return np.asarray(matrix.T @ (np.sqrt(self.prior_weights) * curvatures))
+        slopes = self.problem.slopes
+        bends = matrix.T @ (np.sqrt(self.prior_weights) * curvatures)
+        return np.asarray(bends + slopes.T @ generator.standard_normal(slopes.shape[0]))
 
     def draws(
         self, generator: np.random.Generator, count: int, error: float = _DRAW_ERROR

@@ -197,8 +197,12 @@ def _stretched(
 
 
 def _image_with(posterior: Posterior, psf: PointSpreadFunction) -> Array:
-    formation = replace(posterior.problem.formation, psf=psf)
-    return formation.forward(posterior.light)
+    """Return the image of the solution with another point spread function."""
+    problem = posterior.problem
+    image = replace(problem.formation, psf=psf).forward(posterior.light)
+    if problem.beyond is not None:
+        image += problem.beyond.image(problem.beyond.continuation(posterior.x), psf)
+    return image
 
 
 def _surroundings_images(posterior: Posterior, known: Knowledge) -> Iterator[Array]:
