@@ -104,7 +104,7 @@ def test_help_imports_none_of_the_heavy_libraries(command, own):
         "print(*{name.split('.')[0] for name in set(sys.modules) - before})\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    heavy = {"numba", "scipy", "xarray", "h5py", "matplotlib", "pandas", "pint", "pydantic"}
+    heavy = {"numba", "scipy", "xarray", "h5py", "matplotlib", "pandas", "pydantic"}
     assert not (heavy - own) & set(done.stdout.split())
 
 
