@@ -37,7 +37,7 @@ STUDY = f"""
 title: A chip in closed form
 cutting: {dumps({"field_of_view": AnalyticChip().field_of_view, "numerics": {"cell": "25 um"}})}
 analysis: {{exposures: 3, phases: 1, textures: 1, psf_widths: [8 um, 12 um]}}
-correction: false
+correction: none
 """
 
 

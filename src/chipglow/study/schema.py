@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Final, Self
 
 from chipglow.analysis import AttributionPlan, CorrectionPlan, Plan, WavelengthPlan
 from chipglow.camera import AnnularAperturePSF
@@ -14,6 +14,9 @@ from chipglow.study.scaling import resolved
 from chipglow.study.surface_section import FeaturesSection, SurfaceSection, surface_names
 from chipglow.study.uncertainty_section import UncertaintySection
 from chipglow.text import commented_yaml
+
+_QUICK_CORRECTION: Final = 12.0
+"""Distance from the edge in pixels up to which a quick study corrects: a third of the area."""
 
 
 @dataclass(frozen=True)
@@ -66,12 +69,14 @@ class Study(Part):
     ] = field(default_factory=AttributionPlan)
 
     correction: Annotated[
-        bool,
+        float | None,
         Parameter(
-            "Whether the report of a cut corrects rake face and shear band for all known effects. "
-            "Standard uncertainties are taken from uncertainty.inputs, else from the heated chip."
+            "Distance from the cutting edge in pixels up to which the report of a cut corrects "
+            "rake face and shear band for all known effects; none: no correction. Standard "
+            "uncertainties are taken from uncertainty.inputs, else from the heated chip.",
+            least=4.0,
         ),
-    ] = True
+    ] = CorrectionPlan.reach
 
     wavelengths: Annotated[
         WavelengthPlan, Parameter("Bands that chipglow wavelengths compares, alone and as ratios.")
@@ -102,7 +107,7 @@ class Study(Part):
     @property
     def known(self) -> CorrectionPlan | None:
         """Knowledge of a correction: uncertainties of emissivity and PSF width, by the budget."""
-        if not self.correction:
+        if self.correction is None:
             return None
         inputs = {one.name: one for one in self.uncertainty.build(self).inputs}
         width = inputs.get("camera.psf.fwhm", inputs.get("camera.psf.numerical_aperture"))
@@ -112,9 +117,8 @@ class Study(Part):
             for path in paths:
                 if path in inputs:
                     emissivity[surface] = inputs[path].standard_uncertainty
-        return CorrectionPlan(
-            emissivity, 0.0 if width is None else width.standard_uncertainty / width.value
-        )
+        psf = 0.0 if width is None else width.standard_uncertainty / width.value
+        return CorrectionPlan(emissivity, psf, self.correction)
 
     def with_steady_tool(self) -> Self:
         """Return the same study with a tool at steady-state temperature."""
@@ -150,7 +154,9 @@ class Study(Part):
         widths = ["4 um", "8 um", "12 um", "20 um"]
         draws = {"exposures": 5, "phases": 4, "textures": 2, "psf_widths": widths}
         paths = {f"cutting.{path}": value for path, value in cutting.items()}
-        return changed(cls(), {"title": title, **paths, "analysis": draws})
+        return changed(
+            cls(), {"title": title, **paths, "analysis": draws, "correction": _QUICK_CORRECTION}
+        )
 
     @classmethod
     def completed(cls, data: Any) -> Any:
