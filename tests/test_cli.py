@@ -37,7 +37,7 @@ STUDY = f"""
 title: A chip in closed form
 cutting: {dumps({"field_of_view": AnalyticChip().field_of_view, "numerics": {"cell": "25 um"}})}
 analysis: {{exposures: 3, phases: 1, textures: 1, psf_widths: [8 um, 12 um]}}
-correction: none
+correction: false
 """
 
 
@@ -104,7 +104,7 @@ def test_help_imports_none_of_the_heavy_libraries(command, own):
         "print(*{name.split('.')[0] for name in set(sys.modules) - before})\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    heavy = {"numba", "scipy", "xarray", "h5py", "matplotlib", "pandas", "pydantic"}
+    heavy = {"numba", "scipy", "xarray", "h5py", "matplotlib", "pandas", "pint", "pydantic"}
     assert not (heavy - own) & set(done.stdout.split())
 
 

@@ -109,7 +109,7 @@ def test_stated_uncertainties_come_before_those_of_the_heated_chip(analysis):
     }
     plan = Study(uncertainty={"inputs": stated}).known
     assert plan == CorrectionPlan({"chip 2": 0.03}, pytest.approx(0.02))
-    assert Study(correction=None).known is None
+    assert Study(correction=False).known is None
 
 
 PLACE = SimpleNamespace(

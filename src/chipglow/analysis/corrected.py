@@ -25,6 +25,12 @@ from chipglow.scene import Raster, Scene
 from chipglow.surface import Surface
 from chipglow.uncertainty import Estimate
 
+_REACH: Final = 25.0
+"""Distance from the foot of the rake face in pixels up to which face and band are corrected.
+
+The time of a correction grows with the area, and the hottest parts of both are here.
+"""
+
 _MARGIN: Final = 6.0
 """Pixels around them, which contribute by the blur, and whose own values the border changes."""
 
@@ -42,14 +48,10 @@ class CorrectionPlan:
         the heated chip of the same analysis; without a heated chip the emissivity is exact.
     psf : float
         Relative standard uncertainty of the width of the point spread function.
-    reach : float
-        Distance from the foot of the rake face in pixels up to which face and band are corrected.
-        The time of a correction grows with the area; the hottest parts of both are within 25.
     """
 
     emissivity: Mapping[str, float] = field(default_factory=dict)
     psf: float = 0.0
-    reach: float = 25.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -110,8 +112,7 @@ def corrected_windows(
     """
     for surface in dict.fromkeys(read.values()):
         frame = frames[surface]
-        reach = plan.reach * frame.raster.spacing
-        (rows, columns), _ = _window(frame.raster, segment, reach)
+        (rows, columns), _ = _window(frame.raster, segment)
         measurement = frame.part(rows=rows, columns=columns).with_tool(segment.tool)
         uncertainty = plan.emissivity.get(surface, _found(surface, heated))
         known = observed_scene(scene, camera, surfaces[surface], segment.start, uncertainty)
@@ -124,22 +125,27 @@ def corrected_windows(
         )
         true = scene_truth(result, scene, camera, known, segment.start)
         names = [name for name in read if read[name] == surface]
-        places = _places(surface, names, segment, reach, measurement, result, true)
+        places = _places(surface, names, segment, measurement, result, true)
         yield CorrectedWindow(surface, measurement, result, true, uncertainty, tuple(places))
 
 
-def _window(pixels: Raster, segment: Segment, reach: float) -> tuple[tuple[slice, slice], Raster]:
+def _window(pixels: Raster, segment: Segment) -> tuple[tuple[slice, slice], Raster]:
     """Return the pixels around the first part of rake face and shear band."""
-    face = segment.tool.rake_point([0.0, min(reach, segment.contact_length)])
-    points = np.concatenate([face, _near_ridge(segment, reach)])
+    face = segment.tool.rake_point([0.0, _face_length(pixels, segment)])
+    points = np.concatenate([face, _near_ridge(pixels, segment)])
     margin = _MARGIN * pixels.spacing
     return around(pixels, np.stack([points.min(axis=0) - margin, points.max(axis=0) + margin]))
 
 
-def _near_ridge(segment: Segment, reach: float) -> Array:
+def _face_length(pixels: Raster, segment: Segment) -> float:
+    """Return the length in m of the rake face that is corrected."""
+    return min(_REACH * pixels.spacing, segment.contact_length)
+
+
+def _near_ridge(pixels: Raster, segment: Segment) -> Array:
     """Return the points of the ridge of the shear band that are corrected, (point, 2) in m."""
     points = segment.band.ridge.points
-    near = np.hypot(*(points - segment.tool.rake_foot).T) <= reach
+    near = np.hypot(*(points - segment.tool.rake_foot).T) <= _REACH * pixels.spacing
     return np.asarray(points[near])
 
 
@@ -161,7 +167,6 @@ def _places(
     surface: str,
     names: list[str],
     segment: Segment,
-    reach: float,
     measurement: Measurement,
     result: Correction,
     true: Array,
@@ -171,7 +176,7 @@ def _places(
     on_chip = result.data["zone"][0].values == 0
     shown = measurement.radiance_temperature()[0]
     for name in names:
-        pixels = masks[name](measurement.raster, segment, reach) & _judged(result) & on_chip
+        pixels = masks[name](measurement.raster, segment) & _judged(result) & on_chip
         if not pixels.any():
             continue
         along = _from_foot(measurement.raster, segment)[pixels]
@@ -194,17 +199,17 @@ def _from_foot(pixels: Raster, segment: Segment) -> Array:
     return np.asarray(np.hypot(x - right, y - up))
 
 
-def _beside_face(pixels: Raster, segment: Segment, reach: float) -> NDArray[np.bool_]:
+def _beside_face(pixels: Raster, segment: Segment) -> NDArray[np.bool_]:
     """Return the pixels whose centres are within a pixel of the rake face, along the contact."""
     centres = np.stack(np.meshgrid(pixels.x, pixels.y), axis=-1)
     along, into_chip = segment.tool.face_coordinates(centres)
     beside = (into_chip > 0) & (into_chip < pixels.spacing)
-    return np.asarray(beside & (along >= 0) & (along <= min(reach, segment.contact_length)))
+    return np.asarray(beside & (along >= 0) & (along <= _face_length(pixels, segment)))
 
 
-def _on_ridge(pixels: Raster, segment: Segment, reach: float) -> NDArray[np.bool_]:
+def _on_ridge(pixels: Raster, segment: Segment) -> NDArray[np.bool_]:
     """Return the pixels through which the ridge of the shear band runs, near the edge."""
-    x, y = _near_ridge(segment, reach).T
+    x, y = _near_ridge(pixels, segment).T
     row, column = (
         np.floor(values / pixels.spacing).astype(np.intp)
         for values in (pixels.top - y, x - pixels.left)

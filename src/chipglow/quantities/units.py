@@ -6,7 +6,7 @@ from decimal import Decimal
 from fractions import Fraction
 from functools import cache
 from math import isfinite
-from typing import Annotated, Any, Final, TypeAlias, TypeGuard, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias, TypeGuard, get_origin
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +14,8 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from chipglow.quantities.unit_table import product_of
+if TYPE_CHECKING:
+    from pint import UnitRegistry
 
 Array: TypeAlias = NDArray[np.float64]
 SEED: Final = 2010
@@ -61,10 +62,11 @@ _SPELLINGS: Final = {
     "%": "percent",
 }
 _NO_UNIT: Final = ("", "1", "-", "none", "dimensionless", "m/m", "mm/mm", "m m-1")
+# One digit of exponent: pint would compute any power that a file asks for.
 _TERM: Final = r"(?:1|[A-Za-z°µμ%_]{1,24}(?:(?:\^|\*\*)?[-+]?[1-9])?)"
 _TERMS: Final = re.compile(rf"{_TERM}(?:\s*[*/.·]\s*{_TERM}|\s+{_TERM}){{0,5}}")
 _BELOW: Final = re.compile(r"/\s*\(([^()]*)\)")
-_FACTOR: Final = re.compile(r"([\s*/.·]*)(1|[A-Za-z°µμ%_]+)(?:\^|\*\*)?([-+]?[1-9])?")
+_EXPONENT: Final = re.compile(r"([A-Za-z°µμ%_])(?:\^|\*\*)?([-+]?[1-9])")
 
 
 @dataclass(frozen=True)
@@ -88,9 +90,8 @@ CELSIUS: Final = Unit(1.0, ZERO_CELSIUS)
 
 
 def parse_unit(text: str, base: str, name: str) -> Unit:
-    """Return the unit of a text, as CF, udunits and people write it.
+    """Return the unit of a text (CF, udunits, pint); a date after ``since`` is left out.
 
-    A date after ``since`` is left out.
     A number before the unit, as in ``0.01 K``, multiplies its scale.
     """
     clean = text.split(" since ")[0].strip()
@@ -293,6 +294,15 @@ TEMPERATURE_DIFFERENCE: Final = Quantity(
 
 
 @cache
+def _registry() -> "UnitRegistry[Decimal]":
+    # Loading pint takes a third of a second: only who reads or writes quantities pays for it.
+    # Decimals make 10 us exactly the float 1e-5; binary floats would miss by a rounding.
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Decimal)
+
+
+@cache
 def _scale_and_offset(text: str, base: str) -> tuple[Decimal, Decimal]:
     """Return scale and offset of a unit to SI; a ValueError if it is another quantity's."""
     clean = text.strip()
@@ -300,16 +310,11 @@ def _scale_and_offset(text: str, base: str) -> tuple[Decimal, Decimal]:
     spelled = _BELOW.sub(lambda below: "/" + "/".join(below[1].split()), spelled)
     if not _TERMS.fullmatch(spelled):
         raise ValueError(f"{text!r} is not a unit")
+    written = re.sub(r"(?<=[\w°%])[\s.·]+(?=[A-Za-z°µμ])", "*", spelled)
     try:
-        unit, expected = product_of(_factors(spelled)), product_of(_factors(base))
-    except KeyError as error:
-        raise ValueError(f"{text!r} is not a unit such as {base}: no {error} is known") from None
-    if unit.powers != expected.powers:
-        raise ValueError(f"{text!r} is not a unit such as {base}")
-    return unit.scale, unit.offset
-
-
-def _factors(text: str) -> list[tuple[str, int]]:
-    """Return names and powers of the terms: ``m/s2`` has m to the power 1 and s to -2."""
-    found = _FACTOR.finditer(text)
-    return [(one[2], int(one[3] or 1) * (-1 if "/" in one[1] else 1)) for one in found]
+        unit = _registry().parse_units(_EXPONENT.sub(r"\1**\2", written))
+        zero, one = (_registry().Quantity(Decimal(value), unit).to(base) for value in (0, 1))
+    # A malformed or foreign unit ends in pint as anything from AssertionError to TokenError.
+    except Exception:
+        raise ValueError(f"{text!r} is not a unit such as {base}") from None
+    return one.magnitude - zero.magnitude, zero.magnitude

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
-from typing import Annotated, Any, Final, Self
+from typing import Annotated, Any, Self
 
 from chipglow.analysis import AttributionPlan, CorrectionPlan, Plan, WavelengthPlan
 from chipglow.camera import AnnularAperturePSF
@@ -14,9 +14,6 @@ from chipglow.study.scaling import resolved
 from chipglow.study.surface_section import FeaturesSection, SurfaceSection, surface_names
 from chipglow.study.uncertainty_section import UncertaintySection
 from chipglow.text import commented_yaml
-
-_QUICK_CORRECTION: Final = 12.0
-"""Distance from the edge in pixels up to which a quick study corrects: a third of the area."""
 
 
 @dataclass(frozen=True)
@@ -69,14 +66,12 @@ class Study(Part):
     ] = field(default_factory=AttributionPlan)
 
     correction: Annotated[
-        float | None,
+        bool,
         Parameter(
-            "Distance from the cutting edge in pixels up to which the report of a cut corrects "
-            "rake face and shear band for all known effects; none: no correction. Standard "
-            "uncertainties are taken from uncertainty.inputs, else from the heated chip.",
-            least=4.0,
+            "Whether the report of a cut corrects rake face and shear band for all known effects. "
+            "Standard uncertainties are taken from uncertainty.inputs, else from the heated chip."
         ),
-    ] = CorrectionPlan.reach
+    ] = True
 
     wavelengths: Annotated[
         WavelengthPlan, Parameter("Bands that chipglow wavelengths compares, alone and as ratios.")
@@ -107,7 +102,7 @@ class Study(Part):
     @property
     def known(self) -> CorrectionPlan | None:
         """Knowledge of a correction: uncertainties of emissivity and PSF width, by the budget."""
-        if self.correction is None:
+        if not self.correction:
             return None
         inputs = {one.name: one for one in self.uncertainty.build(self).inputs}
         width = inputs.get("camera.psf.fwhm", inputs.get("camera.psf.numerical_aperture"))
@@ -117,8 +112,9 @@ class Study(Part):
             for path in paths:
                 if path in inputs:
                     emissivity[surface] = inputs[path].standard_uncertainty
-        psf = 0.0 if width is None else width.standard_uncertainty / width.value
-        return CorrectionPlan(emissivity, psf, self.correction)
+        return CorrectionPlan(
+            emissivity, 0.0 if width is None else width.standard_uncertainty / width.value
+        )
 
     def with_steady_tool(self) -> Self:
         """Return the same study with a tool at steady-state temperature."""
@@ -154,9 +150,7 @@ class Study(Part):
         widths = ["4 um", "8 um", "12 um", "20 um"]
         draws = {"exposures": 5, "phases": 4, "textures": 2, "psf_widths": widths}
         paths = {f"cutting.{path}": value for path, value in cutting.items()}
-        return changed(
-            cls(), {"title": title, **paths, "analysis": draws, "correction": _QUICK_CORRECTION}
-        )
+        return changed(cls(), {"title": title, **paths, "analysis": draws})
 
     @classmethod
     def completed(cls, data: Any) -> Any:

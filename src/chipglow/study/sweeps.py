@@ -241,7 +241,7 @@ def sweep(
     axes = {path: axis(values) for path, values in vary.items()}
     points = list(points_of(axes, method, samples, seed))
     # None of these is kept of a point, and each takes longer than the rest.
-    left_out = {"analysis.psf_widths": ("8 um",), "attribution": None, "correction": None}
+    left_out = {"analysis.psf_widths": ("8 um",), "attribution": None, "correction": False}
     study = changed(study, left_out)
     studies = studies_at(study, points)
     settings = [{path: in_si(study, path, one[path]) for path in one} for one in points]
