@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from threading import Event, Thread
 from types import SimpleNamespace
@@ -44,9 +45,12 @@ def model(opened):
     return replace(opened)
 
 
+BUNDLED = cache(example_scene)
+
+
 def seen_by_the_library(study, start):
     """What the library makes of the bundled scene, by none of the app's ways."""
-    fitted = fit(study, example_scene())
+    fitted = fit(study, BUNDLED())
     camera = study.camera.on(fitted.scene.raster, study.seed)
     (surface,) = fitted.surfaces.values()
     return camera, camera.expose(fitted.scene, surface, start), surface

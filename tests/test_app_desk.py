@@ -64,6 +64,7 @@ def typed(settings):
 # Frames one by one
 
 
+@pytest.mark.usefixtures("read_here")
 @pytest.mark.parametrize("kind", ["ptw", "tiff"])
 @pytest.mark.parametrize("frames", ["none", "1:6:2"])
 def test_frames_one_by_one_are_those_of_the_whole_file(request, kind, frames):
@@ -121,6 +122,7 @@ def test_the_app_asks_with_the_words_and_limits_of_the_command(ptw, files):
     assert {"pitch", "calibration"} < settings_of("measurement").keys() > settings.keys()
 
 
+@pytest.mark.usefixtures("read_here")
 @pytest.mark.parametrize("kind", ["ptw", "tiff"])
 def test_the_settings_are_saved_beside_the_file_for_the_app_and_the_command(request, files, kind):
     path, settings = request.getfixturevalue(kind)

@@ -167,6 +167,7 @@ def test_axes_that_would_be_a_guess_are_refused(tmp_path, dims):
             read()
 
 
+@pytest.mark.usefixtures("read_here")
 def test_a_given_pitch_leaves_the_direction_to_the_coordinate(tmp_path):
     path = netcdf4(a_dataset(reverse=("y", "x")), tmp_path)
     kelvins, _ = imported(path, spacing=PITCH)
@@ -178,6 +179,7 @@ def test_a_given_pitch_leaves_the_direction_to_the_coordinate(tmp_path):
     assert "pitch of 10 µm; the given one of 20 µm is used" in measured.data.attrs["remarks"]
 
 
+@pytest.mark.usefixtures("read_here")
 def test_a_turned_image_or_a_tip_replaces_the_position_in_the_file(tmp_path):
     path = netcdf4(a_dataset(), tmp_path)
     settings = ["band=3-5 um"]
@@ -542,6 +544,7 @@ def test_bounds_and_flags_are_not_images(tmp_path):
     assert any("among" in text for text in convert(path).notes.assumed)
 
 
+@pytest.mark.usefixtures("read_here")
 def test_a_flat_field_stored_in_another_direction_is_refused(tmp_path):
     counts = (truth() * 10).astype(np.uint16)
     data = a_dataset(reverse=("y",), values=counts, units="counts")
@@ -552,6 +555,7 @@ def test_a_flat_field_stored_in_another_direction_is_refused(tmp_path):
         load_measurement(path, settings)
 
 
+@pytest.mark.usefixtures("read_here")
 def test_an_image_of_metres_is_doubted_by_both(tmp_path):
     data = a_dataset().assign_coords(
         x=("x", 1e5 * X, {"units": "m"}), y=("y", 1e5 * Y, {"units": "m"})

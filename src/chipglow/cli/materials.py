@@ -17,7 +17,6 @@ def materials(
     import pandas as pd
 
     from chipglow.cutting import material_file, material_names
-    from chipglow.cutting.material_figure import material_figure
     from chipglow.text import Notes
 
     screen = current()
@@ -55,4 +54,7 @@ def materials(
     screen.heading()
     for count, source in enumerate(sources, 1):
         screen.heading(f"({count}) {source}")
-    finish(Notes(), (plot, figure(material_figure, material)))
+    if plot is not None:
+        from chipglow.cutting.material_figure import material_figure
+
+        finish(Notes(), (plot, figure(material_figure, material)))

@@ -39,6 +39,7 @@ _STYLE: Final[Any] = {
     "ytick.labelsize": 9,
     "legend.fontsize": 9,
     "axes.titlelocation": "left",
+    "axes.titley": 1.0,  # otherwise sought above the ticks of each axis in each pass of the layout
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.linewidth": 0.8,

@@ -1,36 +1,5 @@
 """Studies: settings of cut, camera and analysis, as a YAML file or in Python."""
 
-from chipglow.study.band import BandReading as BandReading, band_reading as band_reading
-from chipglow.study.budgets import StudyBudget as StudyBudget, study_budget as study_budget
-from chipglow.study.cache import (
-    CachedScene as CachedScene,
-    cache_folder as cache_folder,
-    cached_scenes as cached_scenes,
-    clear_cache as clear_cache,
-)
-from chipglow.study.corrected import (
-    CorrectedTemperature as CorrectedTemperature,
-    corrected_temperatures as corrected_temperatures,
-)
-from chipglow.study.corrections import correct_study as correct_study
-from chipglow.study.cost import (
-    check_cost as check_cost,
-    check_view as check_view,
-    expected_cost as expected_cost,
-)
-from chipglow.study.design import Design as Design, design as design
-from chipglow.study.files import load_study as load_study, study_text as study_text
-from chipglow.study.fitting import Fitted as Fitted, fit as fit
-from chipglow.study.preview import preview_raster as preview_raster
-from chipglow.study.running import (
-    Progress as Progress,
-    cut as cut,
-    errors as errors,
-    is_cut as is_cut,
-    is_damaged as is_damaged,
-    kept_progress as kept_progress,
-    run as run,
-    wavelengths as wavelengths,
-)
-from chipglow.study.schema import Study as Study
-from chipglow.study.sweeps import Method as Method, Sweep as Sweep, sweep as sweep
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

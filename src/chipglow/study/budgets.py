@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from numba import get_num_threads, set_num_threads
-from scipy.stats import qmc
 
 from chipglow.analysis import outside_warnings
 from chipglow.analysis.single import (
@@ -409,6 +408,8 @@ def _surrogates(
     tell: Progress,
 ) -> tuple[dict[str, Surrogate], Notes]:
     """Cut scenes at a Latin hypercube of the inputs; return the surrogate of each reading."""
+    from scipy.stats import qmc  # slow to import, and few need it
+
     generator = np.random.default_rng(study.seed)
     values = stated.at(qmc.LatinHypercube(len(stated), seed=generator).random(scenes))
     draws = generator.random((_NOMINAL_DRAWS, len(RANDOM)))

@@ -11,7 +11,7 @@ from chipglow.drawing import drawing, scales
 from chipglow.quantities import Quantity, value_text
 
 if TYPE_CHECKING:
-    from chipglow.study.design import Design
+    from chipglow.study.designs import Design
 
 
 def draw_design(result: "Design") -> Figure:

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, get_args
 import numpy as np
 import pandas as pd
 import xarray as xr
-from scipy.stats import qmc
 
 from chipglow.analysis import Analysis, headlines
 from chipglow.io.atomic import atomic_path, exclusive
@@ -384,6 +383,8 @@ def points_of(
         for values in product(*axes.values()):
             yield dict(zip(axes, values, strict=True))
         return
+    from scipy.stats import qmc  # slow to import, and few need it
+
     makers = {"latin-hypercube": qmc.LatinHypercube, "sobol": qmc.Sobol}
     if method not in makers:
         raise ValueError(f"method: {method!r} is unknown, expected one of {get_args(Method)}")

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 from chipglow.quantities import Array
 
@@ -110,7 +110,7 @@ def _chance(found: float, by_chance: float, freedom: tuple[float, float]) -> flo
     """Return the probability of a larger ratio of two variances."""
     if found == 0:
         return 1.0
-    return float(fisher.sf(found / by_chance, *freedom)) if by_chance > 0 else 0.0
+    return float(fdtrc(*freedom, found / by_chance)) if by_chance > 0 else 0.0
 
 
 def _surfaces(mask: NDArray[np.bool_], curved: bool) -> Array:

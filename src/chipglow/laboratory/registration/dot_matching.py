@@ -1,6 +1,6 @@
 """Which dot of one image is which of another: by their arrangement."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -78,7 +78,7 @@ def match_dots(
     nominal = second.shape[1] / first.shape[1]
     starts: list[Array] = []
     for matrix in _hypotheses(first.pixels, second.pixels, nominal, tree, spacing):
-        if all(_distance(matrix, other, first.pixels) > spacing / 2 for other in starts):
+        if (_distances(matrix, starts, first.pixels) > spacing / 2).all():
             starts.append(matrix)
     fits = [_fitted(start, first, second, tree, spacing) for start in starts[:_MAX_PLACEMENTS]]
     judged = [fit for fit in fits if fit is not None]
@@ -185,5 +185,11 @@ def _pairs(placed: Array, tree: KDTree, spacing: float) -> NDArray[np.int64]:
 
 def _distance(one: Array, other: Array, places: Array) -> float:
     """Return the median distance of where two maps put places."""
-    apart = places @ (one - other)[:, :2].T + (one - other)[:, 2]
-    return float(np.median(np.hypot(apart[:, 0], apart[:, 1])))
+    return float(_distances(one, [other], places)[0])
+
+
+def _distances(one: Array, others: Sequence[Array], places: Array) -> Array:
+    """Return the median distances of where a map and each of others put places."""
+    apart = one - np.reshape(others, (-1, 2, 3))
+    put = places @ apart[:, :, :2].swapaxes(1, 2) + apart[:, None, :, 2]
+    return np.asarray(np.median(np.hypot(put[..., 0], put[..., 1]), axis=1))

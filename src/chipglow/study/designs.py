@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from chipglow.analysis.outside import MOST_OUTSIDE
 from chipglow.analysis.single import BELOW, RANDOM, SATURATED
@@ -247,6 +246,8 @@ class _Search:
 
     def extend(self, number: int, draws: int) -> None:
         """Read at a setting until it has this many draws."""
+        from scipy.stats import qmc  # slow to import, and few need it
+
         study = self.studies[number]
         if isinstance(study, Impossible):
             return
