@@ -23,6 +23,7 @@ from bokeh.plotting import figure
 
 from chipglow.app.export import csv_file, picture_file, workbook
 from chipglow.app.figures import MICRONS, TEXT
+from chipglow.app.frames_model import KnownRegions
 from chipglow.app.marks import Kind, Mark, marks_of, new_name, places_text
 from chipglow.app.opened import Opened
 from chipglow.app.reading import MEASURED, Reader, table_of
@@ -30,7 +31,12 @@ from chipglow.app.scene_model import SceneFrames
 from chipglow.app.session import PAUSE, Newest
 from chipglow.app.tools import DrawnPlaces, colour_of
 from chipglow.laboratory.emissivity import PlacesDescription
-from chipglow.laboratory.emissivity.places import ImageView, KnownEmissivity, Palette
+from chipglow.laboratory.emissivity.places import (
+    OF_A_CORRECTION,
+    ImageView,
+    KnownEmissivity,
+    Palette,
+)
 from chipglow.laboratory.readings import PlaceCurves
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.quantities.units import TEMPERATURE
@@ -96,13 +102,18 @@ _LINE_HEIGHT: Final = 190
 class Measuring:
     """Places on the images of a page, and what they measure.
 
-    `later` calls a function in the thread of the page, and `say` shows a text of a kind.
+    `later` calls a function in the thread of the page, `say` shows a text of a kind, and `know`
+    takes the regions with an emissivity.
     """
 
     def __init__(
-        self, opened: Opened, later: Callable[[Callable[[], None]], None], say: Callable[..., None]
+        self,
+        opened: Opened,
+        later: Callable[[Callable[[], None]], None],
+        say: Callable[..., None],
+        know: Callable[[KnownRegions], None],
     ) -> None:
-        self._opened, self._later, self._say = opened, later, say
+        self._opened, self._later, self._say, self._know = opened, later, say, know
         self._marks: list[Mark] = []
         self._view = ImageView()
         self._reader = Reader(opened)
@@ -126,6 +137,7 @@ class Measuring:
     def restore(self, described: PlacesDescription) -> None:
         """Show the places and the view of a file; ValueError for a place outside the image."""
         self._marks = list(marks_of(described, self._opened.frames.raster))
+        self._know(self._regions())
         view = described.view
         for widget, kelvins in (
             (self._low, view.low),
@@ -168,8 +180,17 @@ class Measuring:
             except ValueError as error:
                 self._say(str(error), "error")
             self._show_places()
+            self._know(self._regions())
 
         self._later(change)  # together: the browser draws once
+
+    def _regions(self) -> KnownRegions:
+        """Return the regions with an emissivity."""
+        return {
+            mark.region: mark.emissivity
+            for mark in self._marks
+            if mark.emissivity is not None and mark.region.has_area
+        }
 
     def _on_edit(self, event: Any) -> None:
         def edit() -> None:
@@ -182,7 +203,7 @@ class Measuring:
         mark = self._marks[number]
         if column == "place":
             name = str(value or "").strip()
-            others = [one.name for one in self._marks if one is not mark]
+            others = [*OF_A_CORRECTION, *(one.name for one in self._marks if one is not mark)]
             if not name or name in others:
                 raise ValueError(f"place: {name!r}, expected a name that no other place has")
             return replace(mark, name=name)
@@ -379,7 +400,8 @@ class Measuring:
         for name in ("low", "high", "isotherm"):
             if (kelvins := getattr(self._view, name)) is not None:
                 view[name] = TEMPERATURE.text(round(kelvins, 6))
-        return places_text(self._marks, self._opened.source, self._opened.reflected, view)
+        opened = self._opened
+        return places_text(self._marks, opened.source, opened.surroundings, view, opened.correction)
 
     def _picture(self) -> bytes:
         celsius = self._reader.kelvins - ZERO_CELSIUS
