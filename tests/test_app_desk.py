@@ -1,9 +1,11 @@
 """Files of cameras and other programs in the app: their settings, correction, and two cameras."""
 
+import os
 from threading import Event
 from types import SimpleNamespace
 
 import camera_files
+import h5py
 import numpy as np
 import pytest
 import tifffile
@@ -21,7 +23,9 @@ from chipglow.app.view import PageView
 from chipglow.camera import Camera, GaussianPSF, Measurement
 from chipglow.correction import correct_known, known_parts, read_correction, surroundings_of
 from chipglow.io import write_measurement
+from chipglow.io.cameras.formats import read_here
 from chipglow.io.cameras.ptw import Ptw
+from chipglow.io.cameras.stacks import Stated
 from chipglow.laboratory.emissivity import EmissivityLine
 from chipglow.laboratory.emissivity.places import KnownEmissivity
 from chipglow.laboratory.recordings import CameraFrames, load_description, load_measurement
@@ -121,8 +125,31 @@ def test_a_measurement_in_netcdf_is_read_frame_by_frame(ptw, tmp_path):
     whole = load_measurement(ptw[0], typed(ptw[1]))
     write_measurement(whole, tmp_path / "run.nc")
     model = open_any(tmp_path / "run.nc")
+    with h5py.File(tmp_path / "run.nc") as stored:  # so that a frame is read without the others
+        assert {stored[name].chunks for name in ("radiance", "flags")} == {(1, 40, 60)}
     assert not model.measured._data["radiance"].variable._in_memory
     np.testing.assert_array_equal(model.kelvins(4), whole.radiance_temperature()[4])
+
+
+def test_the_tags_of_a_tiff_are_read_once_for_all_frames(tmp_path, monkeypatch):
+    path, images, opened = tmp_path / "run.tif", spot(), []
+    tifffile.imwrite(path, images, photometric="minisblack", contiguous=False)
+    kind = tifffile.TiffFile
+
+    def noted(*given, **options):
+        opened.append(given)
+        return kind(*given, **options)
+
+    monkeypatch.setattr(tifffile, "TiffFile", noted)
+    stated = Stated(unit="0.1 K", interval=1e-3)
+    for number in (3, 0, 5):
+        read = read_here(path, "tiff", slice(number, number + 1), stated)
+        np.testing.assert_allclose(read.signal[0], images[number] / 10)
+    assert len(opened) == 1
+    tifffile.imwrite(path, images[::-1] + 1, photometric="minisblack")  # another file by this name
+    os.utime(path, ns=(0, 0))
+    read = read_here(path, "tiff", slice(0, 1), stated)
+    np.testing.assert_allclose(read.signal[0], (images[-1] + 1) / 10)
 
 
 # Settings that a file lacks
