@@ -25,7 +25,7 @@ from chipglow.app.export import csv_file, picture_file, workbook
 from chipglow.app.figures import MICRONS, TEXT
 from chipglow.app.frames_model import KnownRegions
 from chipglow.app.marks import Kind, Mark, marks_of, new_name, places_text
-from chipglow.app.opened import Opened
+from chipglow.app.opened import Frames, Opened
 from chipglow.app.reading import MEASURED, Reader, table_of
 from chipglow.app.scene_model import SceneFrames
 from chipglow.app.session import PAUSE, Newest
@@ -40,6 +40,7 @@ from chipglow.laboratory.emissivity.places import (
 from chipglow.laboratory.readings import PlaceCurves
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.quantities.units import TEMPERATURE
+from chipglow.scene import Region
 from chipglow.scene.regions import Point
 
 _COLOURS: Final[Mapping[str, Any]] = {
@@ -118,6 +119,7 @@ class Measuring:
         self._view = ImageView()
         self._reader = Reader(opened)
         self._curves: PlaceCurves | None = None
+        self._asked: tuple[Frames, tuple[Region, ...]] | None = None
         self._table, self._counted = pd.DataFrame(), pd.DataFrame()
         self._profiles: dict[str, pd.DataFrame] = {}
         self._drawn = DrawnPlaces(
@@ -290,6 +292,10 @@ class Measuring:
         self._now.location = float(MICRONS * frames.times[self._opened.frame])
         is_scene, several = isinstance(frames, SceneFrames), len(frames.times) > 1
         self._compute.visible = is_scene and several and bool(self._marks)
+        asked = frames, tuple(mark.region for mark in self._marks)
+        if self._asked is not None and self._asked[0] is frames and self._asked[1] == asked[1]:
+            return  # another frame is shown, or an emissivity changed
+        self._asked = asked
         if several and self._marks and not is_scene:
             self._work.ask(tuple(self._marks))
         else:

@@ -419,11 +419,18 @@ def _session_texts(opened: Model) -> dict[str, str]:
     return texts
 
 
-def _columns(curves: Mapping[str, Array]) -> dict[str, list[float]]:
-    """Return the curves along a line as the page draws them."""
+def _columns(curves: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the curves along a line as the page draws them.
+
+    Bokeh sends arrays as their bytes, and lists number by number, which takes much longer.
+    """
     unknown = np.full_like(curves["along"], np.nan)
     drawn = {"corrected": unknown, **curves}
-    return {key: curve.tolist() for key, curve in drawn.items() if key not in ("low", "high")}
+    return {
+        key: np.asarray(curve, np.float32)
+        for key, curve in drawn.items()
+        if key not in ("low", "high")
+    }
 
 
 def _largest(contributions: Mapping[str, float]) -> dict[str, float]:
