@@ -366,7 +366,7 @@ def test_files_of_a_correction_are_checked_when_they_are_named(small):
     controls = open_any(small / "chip.nc").controls
     (small / "no.yaml").write_text("rake_angle: 3 kg\n")
     for texts, message in (
-        ({"psf_file": "none.nc"}, r"^PSF file: .*no such file.*none\.nc"),
+        ({"psf_file": "none.nc"}, r"^PSF file: /.*none\.nc: there is no such file"),
         ({"psf_file": "chip.nc"}, r"^PSF file: .*chip\.nc"),
         ({"tool": "no.yaml"}, r"^Tool: .*no\.yaml.*rake_angle"),
     ):

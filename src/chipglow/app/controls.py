@@ -577,7 +577,7 @@ def _check_files(study: ShownStudy, texts: Texts) -> None:
         if "tool" in texts and study.tool not in (None, FOUND):
             load_tool(str(study.tool))
     except OSError as error:
-        raise ValueError(str(error)) from None
+        raise ValueError(f"{error.filename}: {error.strerror}") from None
 
 
 def shown_study(study: Study, **shown: Any) -> ShownStudy:

@@ -132,7 +132,7 @@ class Line:
             {"along": [], "measured": [], "reference": [], "corrected": []}, name=f"{name}_values"
         )
         self.band = ColumnDataSource({"along": [], "low": [], "high": []})
-        self._marked: tuple[bool, float | None, float | None] = (False, None, None)
+        self._marked: tuple[bool, float | None, float | None] | None = None
         self.under_range = BoxAnnotation(
             level="underlay", line_color=None, fill_color="#808080", fill_alpha=0.2, visible=False
         )

@@ -242,11 +242,11 @@ class Measuring:
     def _show_table(self) -> None:
         readings = [self._reader.read(mark) for mark in self._marks]
         self._table = table_of(readings)
+        known = [one.emissivity for one in self._marks]
+        # Objects: an empty field, by which a user removes an emissivity, is no number.
         rows = self._table.reindex(columns=[*_COLUMNS]).assign(
-            emissivity=[mark.emissivity.mean if mark.emissivity else nan for mark in self._marks],
-            uncertainty=[
-                mark.emissivity.uncertainty if mark.emissivity else nan for mark in self._marks
-            ],
+            emissivity=pd.Series([one.mean if one else nan for one in known], dtype=object),
+            uncertainty=pd.Series([one.uncertainty if one else nan for one in known], dtype=object),
         )
         self._rows.value = rows
         self._rows.visible = bool(self._marks)
