@@ -474,7 +474,7 @@ def test_the_image_is_corrected_while_the_controls_stay_live(page):
     }
     assert titles == {
         "half_width": "Half-width (95 %) / K",
-        "true": "True temperature / °C",
+        "true": "True / °C",
         "error": "Corrected − true / K",
     }
     assert page.locator("#figure-true").is_visible() and page.locator("#figure-scene").is_hidden()

@@ -1,26 +1,39 @@
 """Files of cameras and other programs in the app: their settings, correction, and two cameras."""
 
+import os
+from threading import Event
 from types import SimpleNamespace
 
 import camera_files
+import h5py
 import numpy as np
 import pytest
 import tifffile
+import xarray as xr
+from command import run
+from hot_frames import hot_frames
+from scipy.ndimage import binary_dilation
 
 from chipglow.app.asking import contents_of, settings_of
 from chipglow.app.controls import CORRECTION_IMAGES
+from chipglow.app.marks import Mark
 from chipglow.app.opening import Asking, OpenFiles, open_any
 from chipglow.app.scene_model import SceneModel
 from chipglow.app.view import PageView
 from chipglow.camera import Camera, GaussianPSF, Measurement
-from chipglow.correction import Zone, correct, surroundings_of
+from chipglow.correction import correct_known, known_parts, read_correction, surroundings_of
 from chipglow.io import write_measurement
+from chipglow.io.cameras.formats import read_here
 from chipglow.io.cameras.ptw import Ptw
+from chipglow.io.cameras.stacks import Stated
+from chipglow.laboratory.emissivity import EmissivityLine
+from chipglow.laboratory.emissivity.places import KnownEmissivity
 from chipglow.laboratory.recordings import CameraFrames, load_description, load_measurement
 from chipglow.quantities import ZERO_CELSIUS
 
 pytest.importorskip("panel", reason="needs the extra app")
 
+BOX = ((240e-6, 190e-6), (280e-6, 230e-6))
 KELVINS = {"unit": "0.1 K", "interval": "1 ms", "pitch": "15 um", "band": "3.8-5.1 um"}
 
 
@@ -55,6 +68,17 @@ def files():
 
 def opened(files, path, settings):
     return files._answered(open_any(path), "measurement", settings)
+
+
+def shown(path):
+    """A page of a file whose picture is shown."""
+    view = PageView(open_any(path), embedded=True)
+    view.start(None)
+    is_shown = Event()
+    view.opened.watch(is_shown.set)
+    view.session.show()
+    assert is_shown.wait(60.0)  # s: of a machine with much else to do
+    return view
 
 
 def typed(settings):
@@ -102,8 +126,31 @@ def test_a_measurement_in_netcdf_is_read_frame_by_frame(ptw, tmp_path):
     whole = load_measurement(ptw[0], typed(ptw[1]))
     write_measurement(whole, tmp_path / "run.nc")
     model = open_any(tmp_path / "run.nc")
+    with h5py.File(tmp_path / "run.nc") as stored:  # so that a frame is read without the others
+        assert {stored[name].chunks for name in ("radiance", "flags")} == {(1, 40, 60)}
     assert not model.measured._data["radiance"].variable._in_memory
     np.testing.assert_array_equal(model.kelvins(4), whole.radiance_temperature()[4])
+
+
+def test_the_tags_of_a_tiff_are_read_once_for_all_frames(tmp_path, monkeypatch):
+    path, images, opened = tmp_path / "run.tif", spot(), []
+    tifffile.imwrite(path, images, photometric="minisblack", contiguous=False)
+    kind = tifffile.TiffFile
+
+    def noted(*given, **options):
+        opened.append(given)
+        return kind(*given, **options)
+
+    monkeypatch.setattr(tifffile, "TiffFile", noted)
+    stated = Stated(unit="0.1 K", interval=1e-3)
+    for number in (3, 0, 5):
+        read = read_here(path, "tiff", slice(number, number + 1), stated)
+        np.testing.assert_allclose(read.signal[0], images[number] / 10)
+    assert len(opened) == 1
+    tifffile.imwrite(path, images[::-1] + 1, photometric="minisblack")  # another file by this name
+    os.utime(path, ns=(0, 0))
+    read = read_here(path, "tiff", slice(0, 1), stated)
+    np.testing.assert_allclose(read.signal[0], (images[-1] + 1) / 10)
 
 
 # Settings that a file lacks
@@ -198,14 +245,11 @@ def test_a_measurement_is_corrected_as_by_the_library(model, ptw):
         [int(np.argmin(abs(whole.data[axis].values - one))) for one in getattr(raster, axis)]
         for axis in "yx"
     )
-    camera = Camera(
-        band=whole.band, pitch=15e-6, psf=GaussianPSF(20e-6), reflected=293.0, fill_factor=1.0
-    )
-    expected = correct(
+    camera = Camera(band=whole.band, pitch=15e-6, psf=GaussianPSF(20e-6), fill_factor=1.0)
+    expected = correct_known(
         Measurement(whole.data.isel(time=[0], y=rows, x=columns)),
         camera,
-        [Zone("image", 0.6, None, 0.01)],
-        surroundings=surroundings_of(camera),
+        known_parts(EmissivityLine.constant(0.6, 0.01)),
     )
     corrected = picture.panels["corrected"].values
     np.testing.assert_array_equal(corrected, expected.data["temperature"][0].values - ZERO_CELSIUS)
@@ -245,6 +289,96 @@ def test_what_is_open_is_given_to_panels_in_kelvins(model):
     assert (shown.unit, shown.is_temperature, view.opened.frame) == ("K", True, 3)
     assert not seen[0]["half_width"].is_temperature
     assert set(view.opened.figures) == set(model.images)
+
+
+@pytest.fixture
+def small(tmp_path, monkeypatch):
+    """A folder with a measurement of few pixels, a point spread function and a tool."""
+    whole = hot_frames(1).part(slice(None), slice(26, 40), slice(33, 47))
+    write_measurement(whole, tmp_path / "chip.nc")
+    spacing = 1.5e-6
+    weights = GaussianPSF(8e-6).kernel(spacing)
+    kernel = xr.Dataset({"kernel": (("y", "x"), weights, {"spacing": spacing})})
+    kernel.to_netcdf(tmp_path / "psf.nc", engine="h5netcdf")
+    (tmp_path / "tool.yaml").write_text("{rake_angle: 0 deg, tip: [270 um, 180 um]}\n")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+STATED = {
+    "a file": {"camera.psf": "file", "psf_file": "psf.nc", "psf_uncertainty": "0.03"},
+    "a camera": {"camera.psf": "flir-a6751"},
+    "a tool": {
+        "camera.psf": "gaussian", "camera.psf.fwhm": "8", "tool": "tool.yaml",
+        "tool_emissivity": "0.8", "outline_uncertainty": "1", "reflected_uncertainty": "5",
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "stated", ["a file", *(pytest.param(one, marks=pytest.mark.slow) for one in [*STATED][1:])]
+)
+def test_the_page_corrects_as_the_command_does_with_its_session(small, stated):
+    view = shown(small / "chip.nc")
+    measuring, model = view.measuring, view.session.model
+    for number, corners in enumerate((((200e-6, 150e-6), (240e-6, 200e-6)), BOX)):
+        measuring._add("box", corners)
+        for column, value in (("emissivity", (0.5, 0.7)[number]), ("uncertainty", 0.02)):
+            measuring._on_edit(SimpleNamespace(row=number, column=column, value=value))
+    measuring._add("box", ((230e-6, 150e-6), (260e-6, 170e-6)))  # it measures only
+    texts = {"emissivity": "0.6", "corrected_part": "whole", **STATED[stated]}
+    state = model.controls.state_with(model.controls.initial, texts)
+    assert model.needs(state) == ""
+    picture = model.corrected(model.picture(state), lambda done: None)
+    view.page._send_msg = lambda message: None
+    view._show_picture(1, picture)
+    (small / "session.yaml").write_text(measuring._session_text())
+    view.end()
+    run("correct", "chip.nc", "--regions", "session.yaml", "--out", "corrected.nc")
+    expected = read_correction("corrected.nc").data
+    found = picture.corrected.correction.data
+    for name in ("temperature", "standard_uncertainty"):
+        # The file has 32 bits; emissivities and lengths are texts of many digits in a session.
+        np.testing.assert_allclose(found[name], expected[name], rtol=1e-6)
+    # The session opens with the same controls.
+    again = shown(small / "session.yaml")
+    assert again.opened.correction == view.opened.correction
+    assert again.session.model.regions == model.regions
+    again.end()
+
+
+def test_a_region_has_its_own_emissivity_in_the_correction(small):
+    model = open_any(small / "chip.nc")
+    region = Mark("box 1", "box", BOX).within(model.raster).region
+    texts = {"camera.psf": "gaussian", "corrected_part": "whole"}
+    state = model.controls.state_with(model.controls.initial, texts)
+    assert model.needs(state) == "the emissivity"
+    model.regions = {region: KnownEmissivity(0.5, 0.02)}
+    assert model.needs(state) == ""
+    corrected = model.corrected(model.picture(state), lambda done: None).corrected
+    known = np.isfinite(corrected.images["corrected"])
+    inside = region.mask(model.raster)
+    # A pixel of which the region covers a part has a temperature too.
+    assert known[inside].all() and not known[~binary_dilation(inside)].any()
+    model.regions = {region: KnownEmissivity(0.8, 0.02)}
+    assert model.picture(state).corrected is None  # it must be computed again
+
+
+def test_files_of_a_correction_are_checked_when_they_are_named(small):
+    controls = open_any(small / "chip.nc").controls
+    (small / "no.yaml").write_text("rake_angle: 3 kg\n")
+    for texts, message in (
+        ({"psf_file": "none.nc"}, r"^PSF file: /.*none\.nc: there is no such file"),
+        ({"psf_file": "chip.nc"}, r"^PSF file: .*chip\.nc"),
+        ({"tool": "no.yaml"}, r"^Tool: .*no\.yaml.*rake_angle"),
+    ):
+        with pytest.raises(ValueError, match=message) as refused:
+            controls.state_with(controls.initial, texts)
+        assert "\n" not in str(refused.value)
+    shown_now = controls.shown(controls.initial)
+    assert not {"psf_file", "tool_emissivity"} & shown_now.keys()
+    state = controls.state_with(controls.initial, {"tool": "found", "camera.psf": "file"})
+    assert {"psf_file", "tool_emissivity"} <= controls.shown(state).keys()
 
 
 # Two cameras

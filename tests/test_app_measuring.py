@@ -154,7 +154,7 @@ def test_the_frame_and_the_surroundings_of_a_session_are_set(file, tmp_path):
     (tmp_path / "session.yaml").write_text(text)
     view = shown(tmp_path / "session.yaml")
     assert view.opened.frame == 2
-    assert view.opened.reflected == pytest.approx(350.0)
+    assert view.opened.surroundings == pytest.approx((350.0, 0.0))
     view.end()
 
 
@@ -209,9 +209,10 @@ def test_what_is_written_is_read_again(tmp_path):
     marks = [Mark(f"{kind}: 1", kind, points, known) for kind, points in SHAPES.items()]
     marks = [mark.within(RASTER) for mark in marks]
     marks[0] = replace(marks[0], feature="chip body")
-    (tmp_path / "s.yaml").write_text(places_text(marks, "a b.nc", 300.0, {"frame": 1}))
+    (tmp_path / "s.yaml").write_text(places_text(marks, "a b.nc", (300.0, 2.0), {"frame": 1}))
     found = load_places(tmp_path / "s.yaml")
     assert (found.file, found.reflected, found.view.frame) == ("a b.nc", 300.0, 1)
+    assert found.reflected_uncertainty == 2.0
     assert sorted(marks_of(found, RASTER), key=str) == sorted(marks, key=str)
 
 

@@ -10,9 +10,11 @@ from contextlib import contextmanager
 
 import pandas as pd
 import pytest
+import xarray as xr
 from hot_frames import hot_frames
 
-from chipglow.io import write_measurement
+from chipglow.camera import GaussianPSF
+from chipglow.io import example_scene, write_measurement, write_scene
 from chipglow.laboratory.emissivity import load_places
 from chipglow.laboratory.readings import read_places
 
@@ -50,7 +52,7 @@ def visited(browser, file, width, height):
             page.on("pageerror", lambda error: wrong.append(str(error)))
             page.on("request", lambda one: None if local(one.url) else wrong.append(one.url))
             page.goto(url)
-            page.locator("#status", has_text=re.compile("^(Measured image|Corrected)")).wait_for()
+            page.locator("#status", has_text=re.compile("^(Measured|Correct|Exact)")).wait_for()
             yield page
             context.close()
         finally:
@@ -83,6 +85,68 @@ def saved(page, label, file):
     with page.expect_download() as started:
         page.get_by_text(label, exact=True).click()
     started.value.save_as(file)
+
+
+def entered(page, row, column, text):
+    """Type a number in a cell of the table."""
+    page.locator(".tabulator-row").nth(row).locator(f'[tabulator-field="{column}"]').click()
+    page.keyboard.press("Control+A")
+    page.keyboard.press("Delete")
+    page.keyboard.type(text)
+    page.keyboard.press("Enter")
+
+
+def set_control(page, label, text):
+    field = page.get_by_label(label, exact=True)
+    field.fill(text)
+    field.press("Enter")
+
+
+def test_regions_and_a_file_of_the_psf_correct_the_image(browser, tmp_path):
+    write_measurement(hot_frames(1), tmp_path / "hot.nc")
+    kernel = {"kernel": (("y", "x"), GaussianPSF(12e-6).kernel(1.5e-6), {"spacing": 1.5e-6})}
+    xr.Dataset(kernel).to_netcdf(tmp_path / "psf.nc", engine="h5netcdf")
+    with visited(browser, tmp_path / "hot.nc", 1400, 900) as page:
+        choose(page, "Box")
+        drag(page, (170, 150), (300, 240))
+        rows(page, 1)
+        entered(page, 0, "emissivity", "0.7")
+        page.locator("#status", has_text=re.compile(r"^Measured image\. Set the point")).wait_for()
+        entered(page, 0, "emissivity", "")  # not known again
+        page.locator("#status", has_text=re.compile(r"^Measured image\. Set the emi")).wait_for()
+        entered(page, 0, "emissivity", "0.5")
+        page.locator("#status", has_text=re.compile(r"^Measured image\. Set the point")).wait_for()
+        page.get_by_label("PSF", exact=True).select_option("file")
+        page.locator("#status", has_text="Set the PSF file").wait_for()
+        set_control(page, "PSF file", str(tmp_path / "none.nc"))
+        page.locator("#status.error", has_text="none.nc: there is no such file").wait_for()
+        set_control(page, "PSF file", str(tmp_path / "psf.nc"))
+        page.locator("#status", has_text=re.compile("^Corrected")).wait_for()
+        ((*_, mean, _, _, _, _, _, _, true, half_width, _),) = rows(page, 1)
+        # At an emissivity of 0.5 and 700 K the radiance temperature is 60 K lower or more.
+        assert float(true) > float(mean) + 60 and float(half_width) > 0
+        saved(page, "Session, YAML", tmp_path / "session.yaml")
+    found = load_places(tmp_path / "session.yaml")
+    assert [one.name for one in found.zones()] == ["box 1"]
+    assert found.psf.file == str(tmp_path / "psf.nc")
+    with visited(browser, tmp_path / "session.yaml", 400, 900) as page:
+        page.locator("#status", has_text=re.compile("^Corrected")).wait_for()
+        assert rows(page, 1)[0][9] == true
+        assert page.evaluate("document.documentElement.scrollWidth") == 400
+
+
+def test_the_frames_of_a_scene_are_measured_when_asked_for(browser, tmp_path):
+    write_scene(example_scene(), tmp_path / "scene.nc")
+    with visited(browser, tmp_path / "scene.nc", 1400, 900) as page:
+        choose(page, "Point")
+        page.mouse.click(*place(page, FIGURE, -40, 270))
+        rows(page, 1)
+        curves = "() => Bokeh.documents[0].get_model_by_name('over_time').data.ys"
+        assert page.evaluate(curves) == []
+        page.get_by_role("button", name="Measure all frames").click()
+        page.wait_for_function(f"() => ({curves})().length === 1 && ({curves})()[0].length > 3")
+        ((curve,),) = (page.evaluate(curves),)
+    assert max(curve) > 300  # °C: the point is on the rake face
 
 
 def test_drawn_places_have_rows_and_curves_and_a_session_brings_them_back(browser, tmp_path):

@@ -11,11 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.analysis import LinePlace
+from chipglow.camera import MeasuredPSFFile, PSFChoice
 from chipglow.camera.exposure import frame_weights
+from chipglow.io import load_tool
+from chipglow.laboratory.emissivity.places import FOUND
 from chipglow.quantities import Parameter, changed, setting_at, unchecked, value_at
-from chipglow.quantities.units import INSTANT, Quantity, is_bare_number
+from chipglow.quantities.units import (
+    INSTANT,
+    LENGTH,
+    TEMPERATURE_DIFFERENCE,
+    Quantity,
+    is_bare_number,
+)
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study
+from chipglow.study.measured_corrections import cameras_with_aperture, psf_choice
 from chipglow.study.surface_section import FeaturesSection, surface_names
 from chipglow.surface import UniformSurface
 
@@ -84,7 +94,10 @@ PARTS: Final[Mapping[str, str]] = {
 REFLECTED: Final = "293 K"
 """Reflected temperature of a measurement: the default of `chipglow.correct`."""
 
-CORRECTING: Final = ("emissivity", "camera.psf", "camera.reflected", "corrected_part")
+CORRECTING: Final = (
+    "emissivity", "camera.psf", "camera.reflected", "corrected_part", "psf_", "tool",
+    "outline_uncertainty", "reflected_uncertainty",
+)  # fmt: skip
 """Beginnings of the paths of controls on which the correction of a measurement depends."""
 
 _ONLY_WITH: Final[Mapping[str, str]] = {
@@ -106,6 +119,12 @@ REFERENCES: Final[Mapping[str, str]] = {
     "true-centre": "True centre",
 }
 """Labels of the references: radiance or true temperature over pixel and exposure."""
+
+PSF_FILE: Final = "file"
+"""Choice of a point spread function that a file states."""
+
+SESSION_PSF: Final = "session"
+"""Choice of the point spread function that the session states."""
 
 OWN: Final = "own numbers"
 AS_STUDY: Final = "study"
@@ -146,6 +165,38 @@ class ShownStudy(Study):
         ),
     ] = 1.0
     corrected_part: Annotated[str, Parameter("Part of a frame that is corrected.")] = "48"
+    psf_source: Annotated[str, Parameter("Whether a file states the PSF, or the page.")] = "page"
+    psf_file: Annotated[str | None, Parameter("Point spread function, output of chipglow psf.")] = (
+        None
+    )
+    psf_uncertainty: Annotated[
+        float, Parameter("Relative standard uncertainty of the width of the PSF.", least=0.0)
+    ] = 0.0
+    tool: Annotated[
+        str | None,
+        Parameter("Tool: a YAML file, or 'found' to detect it; none: as the measurement states."),
+    ] = None
+    tool_emissivity: Annotated[
+        float | None,
+        Parameter("Emissivity of the tool; none: that of the image.", over=0.0, most=1.0),
+    ] = None
+    tool_emissivity_uncertainty: Annotated[
+        float, Parameter("Standard uncertainty of the tool's emissivity.", least=0.0, under=1.0)
+    ] = 0.01
+    outline_uncertainty: Annotated[
+        float | None,
+        Parameter(
+            "Standard uncertainty of the position of outlines; none: that of a found tool.",
+            LENGTH,
+            least=0.0,
+        ),
+    ] = None
+    reflected_uncertainty: Annotated[
+        float,
+        Parameter(
+            "Standard uncertainty of the reflected temperature.", TEMPERATURE_DIFFERENCE, least=0.0
+        ),
+    ] = 0.0
     emissivity_uncertainty: Annotated[
         float, Parameter("Standard uncertainty of the mean emissivity.", least=0.0, under=1.0)
     ] = 0.01
@@ -176,6 +227,10 @@ class Control:
     stops: tuple[float, ...] = ()
     points: int = 0
     quantity: Quantity | None = None
+    is_text: bool = False
+    """Whether it is the name of a file, or a word."""
+    hint: str = "none"
+    """Shown in an empty field."""
 
     @property
     def setting(self) -> str:
@@ -208,13 +263,17 @@ class Control:
             return text.replace(",", ", ").replace(";", "; ")
         if self.options:
             return text
-        return "" if text == "none" else text.split(" ")[0]
+        if text == "none":
+            return ""
+        return text if self.is_text else text.split(" ")[0]
 
     def parse(self, text: str) -> object:
         """Return what the study takes for a text, with or without its unit."""
         text = text.strip()
         if self.points:
             return self._positions(text)
+        if self.is_text:
+            return text or None
         text = text.replace(",", ".").replace("−", "-") or "none"
         if not is_bare_number(text):
             return text
@@ -276,10 +335,17 @@ TABLE: Final = (
 _CORRECTED: Final = (
     Control("emissivity", "Emissivity", "Correction", 0.05),
     Control("emissivity_uncertainty", "Uncertainty (k = 1)", "Correction", 0.0, 0.1, 0.005),
+    Control("tool", "Tool", "Correction", is_text=True, hint="none, found, or a file"),
+    Control("tool_emissivity", "Tool, emissivity", "Correction", 0.05),
+    Control("tool_emissivity_uncertainty", "Tool, its u (k = 1)", "Correction", 0.0, 0.1, 0.005),
+    Control("outline_uncertainty", "Outlines, u (k = 1)", "Correction", 0.0, 10.0, 0.1),
     Control("camera.reflected", "Reflected temperature", "Correction", 0.0, 300.0, 5.0),
+    Control("reflected_uncertainty", "Reflected, u (k = 1)", "Correction", 0.0, 20.0, 0.5),
     Control("camera.psf", "PSF", "Correction"),
+    Control("psf_file", "PSF file", "Correction", is_text=True, hint="psf.nc of chipglow psf"),
     Control("camera.psf.numerical_aperture", "Numerical aperture", "Correction", 0.1, 0.7),
     Control("camera.psf.fwhm", "PSF width (FWHM)", "Correction", 1.0, 100.0, 0.5),
+    Control("psf_uncertainty", "PSF width, relative u", "Correction", 0.0, 0.2, 0.005),
     Control("corrected_part", "Part", "Correction"),
 )
 """The controls of the correction of a measurement."""
@@ -321,6 +387,8 @@ class Controls:
     rows: Mapping[str, Control]
     raster: Raster
     scene: Scene | None = None
+    has_tool: bool = False
+    """Whether a measurement states its tool."""
 
     @classmethod
     def of_scene(cls, study: ShownStudy, scene: Scene, duration: float) -> "Controls":
@@ -345,19 +413,33 @@ class Controls:
         return cls(shown_study(study, images=CORRECTION, start=rounded(times[0])), rows, raster)
 
     @classmethod
-    def of_measurement(cls, study: Study, times: NDArray[np.float64], raster: Raster) -> "Controls":
+    def of_measurement(
+        cls, study: Study, times: NDArray[np.float64], raster: Raster, has_tool: bool
+    ) -> "Controls":
         """Return the controls of a measurement: those of its frames and of their correction."""
+        none = {"camera.psf": "none", "camera.blur": ()}
         known = {"camera.psf": "none", "camera.blur": (), "camera.reflected": REFLECTED}
         study = changed(study, known)
         frames = cls.of_frames(study, times, raster)
         options = {
-            "camera.psf": _first("none", _psfs("Not stated")),
+            "camera.psf": {
+                **_first("none", _psfs("Not stated")),
+                PSF_FILE: Option("From a file", {**none, "psf_source": PSF_FILE}),
+                **_psfs_of_cameras(raster.spacing),
+            },
             "corrected_part": {
                 part: Option(label, {"corrected_part": part}) for part, label in PARTS.items()
             },
         }
         rows = _declared(_CORRECTED, frames.study, options, {})
-        return replace(frames, rows={**frames.rows, **rows})
+        return replace(frames, rows={**frames.rows, **rows}, has_tool=has_tool)
+
+    def with_psf(self, psf: PSFChoice) -> "Controls":
+        """Return the controls of a measurement with a further choice of the PSF, of a session."""
+        row = self.rows["camera.psf"]
+        choice = Option("As in the session", {"camera.psf": psf, "camera.blur": ()})
+        row = replace(row, options={**row.options, SESSION_PSF: choice})
+        return replace(self, rows={**self.rows, row.path: row})
 
     @cached_property
     def initial(self) -> State:
@@ -383,7 +465,14 @@ class Controls:
             path: self.rows[path].shown(text)
             for path, text in values.items()
             if _ONLY_WITH.get(path, state.study.images) == state.study.images
+            and self._has_effect(path, state.study)
         }
+
+    def _has_effect(self, path: str, study: ShownStudy) -> bool:
+        """Return whether a control of a correction has an effect, by the other ones."""
+        if path.startswith("tool_"):
+            return self.has_tool or study.tool is not None
+        return path != "psf_file" or study.psf_source == PSF_FILE
 
     def ranges(self, state: State) -> dict[str, list[float]]:
         """Return what the scene allows at a state: the stops of the start, the exposure's ends.
@@ -413,6 +502,7 @@ class Controls:
         try:
             made = self.state({**state.texts, **texts})
             self._check(made)
+            _check_files(made.study, texts)
         except ValueError as error:
             message = str(error)
             for path in names.values():
@@ -479,6 +569,17 @@ class Controls:
             self._check(state.second)
 
 
+def _check_files(study: ShownStudy, texts: Texts) -> None:
+    """Raise a ValueError if a file that was named now is not what it must be."""
+    try:
+        if "psf_file" in texts and study.psf_file is not None:
+            MeasuredPSFFile(study.psf_file)
+        if "tool" in texts and study.tool not in (None, FOUND):
+            load_tool(str(study.tool))
+    except OSError as error:
+        raise ValueError(f"{error.filename}: {error.strerror}") from None
+
+
 def shown_study(study: Study, **shown: Any) -> ShownStudy:
     """Return a study with settings of the page, such as the start of the exposure."""
     return ShownStudy(**{name: getattr(study, name) for name in study.given}, **shown)
@@ -538,6 +639,16 @@ def _psfs(none: str) -> dict[str, Option]:
         "gaussian": Option("Gaussian", {"camera.psf": {"kind": "gaussian", "fwhm": "8 um"}}),
         "none": Option(none, {"camera.psf": "none", "camera.blur": ()}),
     }
+
+
+def _psfs_of_cameras(pitch: float) -> dict[str, Option]:
+    """Return the point spread functions of the cameras that a study knows by name."""
+    options = {}
+    for name in cameras_with_aperture():
+        with suppress(ValueError):  # no lens sees pixels that small
+            changes = {"camera.psf": psf_choice(name, pitch), "camera.blur": ()}
+            options[name] = Option(name, changes)
+    return options
 
 
 def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:

@@ -90,6 +90,7 @@ class Image:
         one.add_tools(HoverTool(renderers=[glyph], tooltips=tips, attachment="above"), wheel)
         one.toolbar.active_scroll = wheel
         one.grid.visible = False
+        one.xaxis.ticker.desired_num_ticks = 4  # up to five images stand in a row
         one.xaxis.axis_label = "x / µm"
         one.yaxis.axis_label = "y / µm"
         self.label(labelled)
@@ -131,6 +132,7 @@ class Line:
             {"along": [], "measured": [], "reference": [], "corrected": []}, name=f"{name}_values"
         )
         self.band = ColumnDataSource({"along": [], "low": [], "high": []})
+        self._marked: tuple[bool, float | None, float | None] | None = None
         self.under_range = BoxAnnotation(
             level="underlay", line_color=None, fill_color="#808080", fill_alpha=0.2, visible=False
         )
@@ -178,9 +180,12 @@ class Line:
     def show(self, limit: float | None, highest: float, crossing: float | None) -> None:
         """Mark the range limit and where the line enters the tool, and remove the draws."""
         top = None if limit is None or limit > highest else limit
-        self.under_range.update(top=top, visible=limit is not None)
-        self.face.update(location=crossing or 0.0, visible=crossing is not None)
-        self.face_label.update(x=crossing or 0.0, visible=crossing is not None)
+        if self._marked != (marked := (limit is not None, top, crossing)):
+            self._marked = marked
+            # Bokeh then searches all models of the page, which takes longer than all else.
+            self.under_range.update(top=top, visible=limit is not None)
+            self.face.update(location=crossing or 0.0, visible=crossing is not None)
+            self.face_label.update(x=crossing or 0.0, visible=crossing is not None)
         if len(self.band.data["along"]):
             self.band.data = {"along": [], "low": [], "high": []}
 

@@ -1,14 +1,22 @@
 """Pictures of measured and of corrected frames, whose true temperature is not known."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, Final, Protocol
+from typing import ClassVar, Final, Protocol, TypeAlias
 
 import numpy as np
 import xarray as xr
 
-from chipglow.app.controls import CORRECTING, REFERENCES, WHOLE, Controls, ShownStudy, State
+from chipglow.app.controls import (
+    CORRECTING,
+    PSF_FILE,
+    REFERENCES,
+    WHOLE,
+    Controls,
+    ShownStudy,
+    State,
+)
 from chipglow.app.pictures import (
     Corrected,
     Panel,
@@ -25,12 +33,17 @@ from chipglow.app.pictures import (
     values_at,
     with_correction,
 )
-from chipglow.camera import Camera, Measurement
+from chipglow.camera import MeasuredPSFFile, Measurement, PSFChoice
 from chipglow.camera.exposure_kernels import Check
-from chipglow.correction import Correction, Zone, correct, surroundings_of
-from chipglow.laboratory.emissivity import PlacesDescription
+from chipglow.correction import Correction
+from chipglow.correction.known import ELSEWHERE, TOOL
+from chipglow.laboratory.chip.tool_choice import chosen_tool
+from chipglow.laboratory.emissivity import EmissivityLine, PlacesDescription, reflected_temperature
+from chipglow.laboratory.emissivity.places import KnownEmissivity
 from chipglow.quantities import Array
-from chipglow.scene import Raster, Tool
+from chipglow.quantities.units import COLDEST
+from chipglow.scene import Raster, Region, Tool
+from chipglow.study.measured_corrections import correct_measured, misfit_notes
 from chipglow.text import Notes
 
 REFERENCE: Final = "reference_temperature"
@@ -38,6 +51,9 @@ REFERENCE: Final = "reference_temperature"
 
 _KEPT: Final = 8
 """Corrections that a page keeps."""
+
+KnownRegions: TypeAlias = Mapping[Region, KnownEmissivity]
+"""Regions of an image and their emissivities."""
 
 
 class _FramesModel(ABC):
@@ -112,6 +128,8 @@ class MeasurementModel(_FramesModel):
     """The file as a session names it."""
     places: PlacesDescription | None = None
     """Places and view of the session that was opened."""
+    regions: KnownRegions = field(default_factory=dict)
+    """Regions that a correction tells apart."""
     _last: dict[int, tuple[xr.Dataset, dict[str, Panel], str]] = field(
         init=False, default_factory=dict, repr=False
     )
@@ -179,41 +197,48 @@ class MeasurementModel(_FramesModel):
         """Return what a correction still needs, in words; empty if nothing."""
         study, band = state.study, "band_lower" in self.measured.first.data.attrs
         missing = {
-            "the emissivity": study.emissivity is None,
-            "the point spread function (PSF)": study.camera.psf is None,
+            "the emissivity": study.emissivity is None and not self.regions,
+            "the PSF file": study.psf_source == PSF_FILE and study.psf_file is None,
+            "the point spread function (PSF)": study.psf_source != PSF_FILE
+            and study.camera.psf is None,
             "the camera's band": not band,
         }
         return " and ".join(name for name, is_missing in missing.items() if is_missing)
 
     def corrected(self, picture: Picture, check: Callable[[float], None]) -> Picture:
         """Return a picture with the corrected image; `check` takes the completed fraction."""
-        state = picture.state
-        study, measurement = state.study, self.measured.measurement(self.frame(state))
+        state, study = picture.state, picture.state.study
+        measurement = self.measured.measurement(self.frame(state))
+        tool, outline_uncertainty, notes = _tool(measurement, study)
         rows, columns = self._part(state)
-        camera = self._camera(study, measurement)
-        whole = Zone("image", study.emissivity, None, study.emissivity_uncertainty)
-        result = correct(
-            measurement.part(rows=rows, columns=columns),
-            camera,
-            [whole],
-            surroundings=surroundings_of(camera),
+        regions = [one for one in self.regions if one.mask(self.raster)[rows, columns].any()]
+        part = measurement.part(rows=rows, columns=columns)
+        tool = tool if tool is not None and _reaches(tool, part.raster) else None
+        lines = _emissivities(study, {one: self.regions[one] for one in regions}, tool)
+        if not lines:
+            raise ValueError(
+                "no region with an emissivity reaches the corrected part: move the cursor, or set "
+                "Part or Emissivity"
+            )
+        result = correct_measured(
+            part,
+            psf_of(study),
+            lines,
+            regions,
+            tool,
+            surroundings=reflected_temperature(
+                COLDEST if study.camera.reflected is None else study.camera.reflected,
+                study.reflected_uncertainty,
+            ),
+            psf_uncertainty=study.psf_uncertainty,
+            outline_uncertainty=outline_uncertainty,
             progress=check,
         )
+        result = result.with_notes(notes + misfit_notes(result))
         self._corrected[self._key(state)] = Corrected(result)
         while len(self._corrected) > _KEPT:
             del self._corrected[next(iter(self._corrected))]
         return self.picture(state)
-
-    def _camera(self, study: ShownStudy, measurement: Measurement) -> Camera:
-        """Return the camera of the measurement, with the optics of the page."""
-        stated = study.camera
-        return Camera(
-            band=measurement.band,
-            pitch=measurement.raster.spacing,
-            fill_factor=float(measurement.data.attrs.get("fill_factor", 1.0)),
-            psf=None if stated.psf is None else stated.psf.for_camera(measurement.band, None),
-            reflected=stated.reflected,
-        )
 
     def _part(self, state: State) -> tuple[slice, slice]:
         size = state.study.corrected_part
@@ -224,7 +249,8 @@ class MeasurementModel(_FramesModel):
 
     def _key(self, state: State) -> Hashable:
         rows, columns = self._part(state)
-        return state.key(*CORRECTING), self.frame(state), rows.start, columns.start
+        regions = tuple(self.regions.items())
+        return state.key(*CORRECTING), regions, self.frame(state), rows.start, columns.start
 
     def measurement_of(self, picture: Picture) -> Measurement:
         """Return the frame of a picture."""
@@ -241,6 +267,45 @@ class MeasurementModel(_FramesModel):
             estimate = pixel.estimate(values, pixel.calibration_effects(0)[None])
             numbers["uncertainty"] = float(estimate.standard_uncertainty[0, 0, 0])
         return numbers
+
+
+def psf_of(study: ShownStudy) -> PSFChoice:
+    """Return the point spread function of a page's controls; there must be one."""
+    if study.psf_source == PSF_FILE:
+        return MeasuredPSFFile(str(study.psf_file))
+    assert study.camera.psf is not None
+    return study.camera.psf
+
+
+def _tool(measurement: Measurement, study: ShownStudy) -> tuple[Tool | None, float, Notes]:
+    """Return the tool of a frame, and the standard uncertainty of its outline in m."""
+    tool, known, notes = measurement.tool, None, Notes()
+    if study.tool is not None:
+        tool, known, notes = chosen_tool(measurement, study.tool)
+    found = 0.0 if known is None else known.across
+    given = study.outline_uncertainty
+    return tool, found if given is None else given, notes
+
+
+def _reaches(tool: Tool, raster: Raster) -> bool:
+    """Return whether a tool covers the centre of a pixel."""
+    return bool((tool.signed_distance(*np.meshgrid(raster.x, raster.y)) < 0).any())
+
+
+def _emissivities(
+    study: ShownStudy, regions: KnownRegions, tool: Tool | None
+) -> dict[str, EmissivityLine]:
+    """Return the emissivities of regions, of the tool, and elsewhere, by their names."""
+    lines = {region.name: known.line() for region, known in regions.items()}
+    if study.emissivity is not None:
+        line = EmissivityLine.constant(study.emissivity, study.emissivity_uncertainty)
+        lines |= {ELSEWHERE: line, TOOL: line}
+    if study.tool_emissivity is not None:
+        own = study.tool_emissivity_uncertainty
+        lines[TOOL] = EmissivityLine.constant(study.tool_emissivity, own)
+    if tool is None:
+        lines.pop(TOOL, None)
+    return lines
 
 
 @dataclass(eq=False)

@@ -1,6 +1,6 @@
 """Places that a user draws on the images: outlines, handles, and the file that states them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, TypeAlias
 
@@ -9,7 +9,7 @@ import numpy as np
 from chipglow.laboratory.emissivity import EmissivityLine, PlacesDescription
 from chipglow.laboratory.emissivity.places import KnownEmissivity
 from chipglow.quantities import Array
-from chipglow.quantities.units import KELVINS, POSITION
+from chipglow.quantities.units import KELVINS, POSITION, TEMPERATURE_DIFFERENCE
 from chipglow.scene import Circle, Pixel, Polygon, Polyline, Raster, Region
 from chipglow.scene.regions import Point, named_value
 from chipglow.text.template import yaml_line
@@ -173,9 +173,17 @@ def _drawn(place: Region, raster: Raster) -> tuple[Kind, tuple[Point, ...]]:
 
 
 def places_text(
-    marks: Sequence[Mark], file: str, reflected: float | None, view: dict[str, Any]
+    marks: Sequence[Mark],
+    file: str,
+    surroundings: tuple[float, float] | None,
+    view: dict[str, Any],
+    correction: Mapping[str, Any] = {},
 ) -> str:
-    """Return the file of places as YAML; `reflected` is the surroundings' temperature in K."""
+    """Return the file of places as YAML.
+
+    `surroundings` are the reflected temperature and its standard uncertainty in K; `correction`
+    has further entries, and emissivities that are not those of places.
+    """
     sections: dict[str, dict[str, Any]] = {"regions": {}, "points": {}, "lines": {}}
     for mark in marks:
         key, value = mark.entry()
@@ -185,12 +193,18 @@ def places_text(
         for mark in marks
         if mark.emissivity is not None
     }
+    known |= correction.get("emissivities", {})
     lines = ["# chipglow app session.yaml", f"file: {yaml_line(file)}"]
     for key, entries in {**sections, "emissivities": known}.items():
         if entries:
             lines.append(f"{key}:")
             lines += [f"  {yaml_line(name)}: {yaml_line(one)}" for name, one in entries.items()]
-    if reflected is not None:
+    if surroundings is not None:
+        reflected, uncertainty = surroundings
         lines.append(f"reflected: {KELVINS.text(reflected)}")
+        if uncertainty:
+            lines.append(f"reflected_uncertainty: {TEMPERATURE_DIFFERENCE.text(uncertainty)}")
+    others = {key: value for key, value in correction.items() if key != "emissivities"}
+    lines += [f"{key}: {yaml_line(value)}" for key, value in others.items()]
     lines.append(f"view: {yaml_line(view)}")
     return "\n".join(lines) + "\n"

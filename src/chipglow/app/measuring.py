@@ -23,17 +23,24 @@ from bokeh.plotting import figure
 
 from chipglow.app.export import csv_file, picture_file, workbook
 from chipglow.app.figures import MICRONS, TEXT
+from chipglow.app.frames_model import KnownRegions
 from chipglow.app.marks import Kind, Mark, marks_of, new_name, places_text
-from chipglow.app.opened import Opened
+from chipglow.app.opened import Frames, Opened
 from chipglow.app.reading import MEASURED, Reader, table_of
 from chipglow.app.scene_model import SceneFrames
 from chipglow.app.session import PAUSE, Newest
 from chipglow.app.tools import DrawnPlaces, colour_of
 from chipglow.laboratory.emissivity import PlacesDescription
-from chipglow.laboratory.emissivity.places import ImageView, KnownEmissivity, Palette
+from chipglow.laboratory.emissivity.places import (
+    OF_A_CORRECTION,
+    ImageView,
+    KnownEmissivity,
+    Palette,
+)
 from chipglow.laboratory.readings import PlaceCurves
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.quantities.units import TEMPERATURE
+from chipglow.scene import Region
 from chipglow.scene.regions import Point
 
 _COLOURS: Final[Mapping[str, Any]] = {
@@ -96,17 +103,23 @@ _LINE_HEIGHT: Final = 190
 class Measuring:
     """Places on the images of a page, and what they measure.
 
-    `later` calls a function in the thread of the page, and `say` shows a text of a kind.
+    `later` calls a function in the thread of the page, `say` shows a text of a kind, and `know`
+    takes the regions with an emissivity.
     """
 
     def __init__(
-        self, opened: Opened, later: Callable[[Callable[[], None]], None], say: Callable[..., None]
+        self,
+        opened: Opened,
+        later: Callable[[Callable[[], None]], None],
+        say: Callable[..., None],
+        know: Callable[[KnownRegions], None],
     ) -> None:
-        self._opened, self._later, self._say = opened, later, say
+        self._opened, self._later, self._say, self._know = opened, later, say, know
         self._marks: list[Mark] = []
         self._view = ImageView()
         self._reader = Reader(opened)
         self._curves: PlaceCurves | None = None
+        self._asked: tuple[Frames, tuple[Region, ...]] | None = None
         self._table, self._counted = pd.DataFrame(), pd.DataFrame()
         self._profiles: dict[str, pd.DataFrame] = {}
         self._drawn = DrawnPlaces(
@@ -126,6 +139,7 @@ class Measuring:
     def restore(self, described: PlacesDescription) -> None:
         """Show the places and the view of a file; ValueError for a place outside the image."""
         self._marks = list(marks_of(described, self._opened.frames.raster))
+        self._know(self._regions())
         view = described.view
         for widget, kelvins in (
             (self._low, view.low),
@@ -168,8 +182,17 @@ class Measuring:
             except ValueError as error:
                 self._say(str(error), "error")
             self._show_places()
+            self._know(self._regions())
 
         self._later(change)  # together: the browser draws once
+
+    def _regions(self) -> KnownRegions:
+        """Return the regions with an emissivity."""
+        return {
+            mark.region: mark.emissivity
+            for mark in self._marks
+            if mark.emissivity is not None and mark.region.has_area
+        }
 
     def _on_edit(self, event: Any) -> None:
         def edit() -> None:
@@ -182,7 +205,7 @@ class Measuring:
         mark = self._marks[number]
         if column == "place":
             name = str(value or "").strip()
-            others = [one.name for one in self._marks if one is not mark]
+            others = [*OF_A_CORRECTION, *(one.name for one in self._marks if one is not mark)]
             if not name or name in others:
                 raise ValueError(f"place: {name!r}, expected a name that no other place has")
             return replace(mark, name=name)
@@ -219,11 +242,11 @@ class Measuring:
     def _show_table(self) -> None:
         readings = [self._reader.read(mark) for mark in self._marks]
         self._table = table_of(readings)
+        known = [one.emissivity for one in self._marks]
+        # Objects: an empty field, by which a user removes an emissivity, is no number.
         rows = self._table.reindex(columns=[*_COLUMNS]).assign(
-            emissivity=[mark.emissivity.mean if mark.emissivity else nan for mark in self._marks],
-            uncertainty=[
-                mark.emissivity.uncertainty if mark.emissivity else nan for mark in self._marks
-            ],
+            emissivity=pd.Series([one.mean if one else nan for one in known], dtype=object),
+            uncertainty=pd.Series([one.uncertainty if one else nan for one in known], dtype=object),
         )
         self._rows.value = rows
         self._rows.visible = bool(self._marks)
@@ -269,6 +292,10 @@ class Measuring:
         self._now.location = float(MICRONS * frames.times[self._opened.frame])
         is_scene, several = isinstance(frames, SceneFrames), len(frames.times) > 1
         self._compute.visible = is_scene and several and bool(self._marks)
+        asked = frames, tuple(mark.region for mark in self._marks)
+        if self._asked is not None and self._asked[0] is frames and self._asked[1] == asked[1]:
+            return  # another frame is shown, or an emissivity changed
+        self._asked = asked
         if several and self._marks and not is_scene:
             self._work.ask(tuple(self._marks))
         else:
@@ -379,7 +406,8 @@ class Measuring:
         for name in ("low", "high", "isotherm"):
             if (kelvins := getattr(self._view, name)) is not None:
                 view[name] = TEMPERATURE.text(round(kelvins, 6))
-        return places_text(self._marks, self._opened.source, self._opened.reflected, view)
+        opened = self._opened
+        return places_text(self._marks, opened.source, opened.surroundings, view, opened.correction)
 
     def _picture(self) -> bytes:
         celsius = self._reader.kelvins - ZERO_CELSIUS

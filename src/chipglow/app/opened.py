@@ -73,8 +73,10 @@ class Opened:
     """The frame that is shown, with its band and flags; None of a correction."""
     corrected: Corrected | None = field(init=False, default=None)
     """The frame's correction, if it is shown."""
-    reflected: float | None = field(init=False, default=None)
-    """Temperature of the reflected surroundings in K, if the page states it."""
+    surroundings: tuple[float, float] | None = field(init=False, default=None)
+    """Temperature of the reflected surroundings and its standard uncertainty in K, if stated."""
+    correction: Mapping[str, Any] = field(init=False, default_factory=dict)
+    """What the page states for a correction, as a file of places does."""
     _shown: Any = field(init=False, default=None, repr=False)
     _panels: Mapping[str, Panel] = field(init=False, default_factory=dict, repr=False)
     """Kept, so that no other arrays have their places in memory."""
@@ -88,14 +90,16 @@ class Opened:
         self, picture: Picture, frames: Frames, frame: int, measured: Measurement | None
     ) -> None:
         """Take the images of an exact picture, all frames, and the index and data of its frame."""
-        reflected = picture.state.study.camera.reflected
-        shown = frame, reflected, {name: id(one.values) for name, one in picture.panels.items()}
+        study = picture.state.study
+        reflected = study.camera.reflected
+        surroundings = None if reflected is None else (reflected, study.reflected_uncertainty)
+        shown = frame, surroundings, {name: id(one.values) for name, one in picture.panels.items()}
         if shown == self._shown:  # the cursor moved
             return
         self._shown, self._panels = shown, picture.panels
         self.images = {name: ShownImage.of(panel) for name, panel in picture.panels.items()}
         self.frames, self.frame = frames, frame
         self.measured, self.corrected = measured, picture.corrected
-        self.reflected = reflected
+        self.surroundings = surroundings
         for listener in self._listeners:
             listener()

@@ -98,7 +98,8 @@ def measurement_model(
     """Open a measurement with cursor and lines through the hottest pixel of its first frame."""
     first = measured.first
     study = _at_the_hottest(Study(), first.radiance_temperature()[0], first.raster)
-    controls = Controls.of_measurement(study, measured.times, first.raster)
+    has_tool = first.tool is not None
+    controls = Controls.of_measurement(study, measured.times, first.raster, has_tool)
     return MeasurementModel(name, measured, controls, description)
 
 
@@ -159,7 +160,8 @@ class Asking:
             return replace(self, error=self._by_name(str(error)), settings=settings)
         if settings:
             save_description(self.path, known)
-        return replace(opened, source=self.source, places=self.places)
+        opened = replace(opened, source=self.source)
+        return opened if self.places is None else with_places(opened, self.places)
 
     def _by_name(self, message: str) -> str:
         return message.replace(str(self.path), self.name).replace(self.path.name, self.name)
@@ -191,7 +193,15 @@ def _session(path: Path) -> Model | Asking:
         raise FileNotFoundError(f"{path}: file: {file}: there is no such file")
     if _is_yaml(file.name) and is_places(read_yaml(file)):
         raise ValueError(f"{path}: file: {file} is a session too, expected a measurement")
-    return replace(open_any(file), places=places)
+    return with_places(open_any(file), places)
+
+
+def with_places(opened: Model | Asking, places: PlacesDescription) -> Model | Asking:
+    """Return an open file with the places, view and point spread function of a session."""
+    if isinstance(opened, MeasurementModel) and places.psf is not None:
+        controls = opened.controls.with_psf(places.psf)
+        return replace(opened, places=places, controls=controls)
+    return replace(opened, places=places)
 
 
 def _opened(path: Path, study: Study | None) -> Model | Asking:
@@ -344,7 +354,7 @@ def _shown_of(path: Path) -> dict[str, Any]:
     return {}
 
 
-def _session_of_open_file(path: Path, others: Iterable[Model | Asking]) -> Model | None:
+def _session_of_open_file(path: Path, others: Iterable[Model | Asking]) -> Model | Asking | None:
     """Return the open file that a session names, with its places; None for another file."""
     if not is_places(read_yaml(path)):
         return None
@@ -352,7 +362,7 @@ def _session_of_open_file(path: Path, others: Iterable[Model | Asking]) -> Model
     named = Path(places.file or "").name
     for other in others:
         if not isinstance(other, Asking) and named == Path(other.source).name:
-            return replace(other, places=places)
+            return with_places(other, places)
     raise ValueError(f"{path}: its file {named or 'is not stated'}: open that file first")
 
 

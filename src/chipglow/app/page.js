@@ -3,7 +3,8 @@
 
 const BORDER = 54, GAP = 18, LEAST_FRAME = 180;
 const NARROW = 888, LEAST_PAIR = 560; // widths in pixels of the part beside the controls
-const MOST_ACROSS = 3; // images in a row
+const LEAST_IN_ROW = 150; // width of a frame up to which all images stand in one row
+const ACROSS = 3; // images in a row if they do not
 const GRIP = 12; // pixels
 
 export function render({ view, model, el }) {
@@ -337,11 +338,19 @@ export function render({ view, model, el }) {
     const height = Math.round(spec.embedded ? 900 : innerHeight);
     if (width < 1 || size === `${width}x${height}`) return false;
     size = `${width}x${height}`;
-    const count = width < LEAST_PAIR ? 1 : Math.min(Math.max(shown.length, 2), MOST_ACROSS);
-    const wide = (width - BORDER - (count - 1) * GAP) / count - (count === 1 ? 26 : 12);
+    const frameOf = (count) => (width - BORDER - (count - 1) * GAP) / count - (count === 1 ? 26 : 12);
+    const all = Math.max(shown.length, 2);
+    const count = width < LEAST_PAIR ? 1 : frameOf(all) >= LEAST_IN_ROW ? all : Math.min(all, ACROSS);
+    const wide = frameOf(count);
     const tallest = Math.max(0.52 * height - 60, LEAST_FRAME);
-    const frame = Math.trunc(Math.max(Math.min(wide, tallest / spec.shape), LEAST_FRAME));
-    const below = Math.trunc(Math.max(Math.min(height - frame * spec.shape - 345, 330), 150));
+    const least = Math.min(LEAST_FRAME, wide);
+    const frame = Math.trunc(Math.max(Math.min(wide, tallest / spec.shape), least));
+    const below = Math.trunc(Math.max(Math.min(height - frame * spec.shape - 372, 330), 150));
+    // The first image of a further row stands under that of the first one, which has an axis.
+    shown.forEach((name, i) => {
+      const starts = i > 0 && i % count === 0 && count > 1;
+      find(`#figure-${name}`).style.paddingLeft = starts ? `${BORDER - 4}px` : "";
+    });
     // Numbers stand beside the lines, or below them where it is narrow: see page.css.
     const numbers = width > NARROW ? 345 : 60;
     const pair = (width - 2 * BORDER - numbers) / 2 - 20;

@@ -23,6 +23,12 @@ _STEP: Final = 16
 """Pixels by which this part follows the cursor, so that few moves need a new correction."""
 
 
+_SHORT_TITLES: Final = {"measured": "Measured", "corrected": "Corrected", "true": "True"}
+"""Titles of images of temperatures, of which many stand in a row."""
+
+_LONG_TITLES: Final = 2
+"""Images of a correction, next to the measured one, up to which titles are longer."""
+
 _LINE_OF: Final = {
     "reference": "true", "corrected": "temperature", "low": "lower", "high": "upper",
 }  # fmt: skip
@@ -145,9 +151,12 @@ def with_correction(
     temperature = images["corrected"]
     if np.isfinite(temperature).any():
         low, high = min(low, np.nanmin(temperature)), max(high, np.nanmax(temperature))
-    panels = {"measured": replace(measured, limits=(low, high))}
+    is_short = len(names) > _LONG_TITLES
+    title = _SHORT_TITLES["measured"] if is_short else measured.name
+    panels = {"measured": replace(measured, name=title, limits=(low, high))}
     for name, image in images.items():
         title = CORRECTION_IMAGES[name]
+        title = _SHORT_TITLES.get(name, title) if is_short else title
         if name == "error":
             panels[name] = error_panel(title, image, raster)
         elif name == "half_width":

@@ -43,7 +43,7 @@ class Reader:
     def __init__(self, opened: Opened) -> None:
         self._opened = opened
         self._masks: dict[tuple[Region, Raster], NDArray[np.bool_]] = {}
-        self._readings: dict[tuple[Mark, float | None], PlaceReading] = {}
+        self._readings: dict[tuple[Mark, tuple[float, float] | None], PlaceReading] = {}
         self._band: Band | None = None
 
     @property
@@ -79,10 +79,10 @@ class Reader:
 
         A place outside the image, which a change of the camera may cause, has no reading.
         """
-        key = mark, self._opened.reflected
+        key = mark, self._opened.surroundings
         if key not in self._readings:
-            reflected = self._opened.reflected
-            surroundings = None if reflected is None else reflected_temperature(reflected)
+            stated = self._opened.surroundings
+            surroundings = None if stated is None else reflected_temperature(*stated)
             self._readings[key] = self._read(mark, surroundings)
         return self._readings[key]
 

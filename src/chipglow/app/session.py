@@ -7,7 +7,7 @@ from threading import Event, Lock, Thread
 from typing import Final, Generic, TypeAlias, TypeVar
 
 from chipglow.app.controls import CORRECTION, State, Texts
-from chipglow.app.frames_model import CorrectionModel
+from chipglow.app.frames_model import CorrectionModel, KnownRegions, MeasurementModel
 from chipglow.app.models import Model
 from chipglow.app.pictures import Picture
 from chipglow.app.scene_model import SceneModel
@@ -95,6 +95,13 @@ class Session:
         self._painted.set()
         self._pictures = Newest(self._picture, notify)
         self._draws = Newest(self._draw, notify)
+
+    def know(self, regions: KnownRegions) -> None:
+        """Set the regions of known emissivity, which a correction of a measurement tells apart."""
+        model = self.model
+        if isinstance(model, MeasurementModel) and regions != model.regions:
+            model.regions = regions
+            self.show()
 
     def show(self) -> None:
         self._draws.cancel()

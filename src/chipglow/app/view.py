@@ -24,6 +24,7 @@ from chipglow.analysis.attribution import AttributionReference
 from chipglow.analysis.images import PARTS
 from chipglow.app.asking import description_path
 from chipglow.app.controls import CORRECTION, ERROR_IMAGES, WHOLE, Texts, rounded
+from chipglow.app.correction_settings import correction_data, correction_texts
 from chipglow.app.figures import TEXT, Figures
 from chipglow.app.frames_model import MeasurementModel
 from chipglow.app.measuring import Measuring
@@ -35,7 +36,6 @@ from chipglow.app.scene_model import SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.quantities.format import quantity_text, readable, rounded_text, uncertain_decimals
-from chipglow.quantities.units import KELVINS
 
 _FOLDER: Final = Path(__file__).parent
 _DROPPER_STYLE: Final = """
@@ -104,7 +104,7 @@ class PageView:
         images = {name: one.figure for name, one in self.figures.images.items()}
         model, state = self.session.model, self.session.state
         self.opened = Opened(opened.name, opened.source, opened.notes, images, model.frames(state))
-        self.measuring = Measuring(self.opened, self._later, self._say)
+        self.measuring = Measuring(self.opened, self._later, self._say, self.session.know)
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._show_opened = partial(self._send, "open")
@@ -270,6 +270,8 @@ class PageView:
             model = self.session.model
             state = picture.state
             measured = model.measurement_of(picture)
+            if isinstance(model, MeasurementModel):
+                self.opened.correction = correction_data(state.study)
             self.opened.show(picture, model.frames(state), model.frame(state), measured)
         self._say(*self._described(picture))
         # The page draws the curves after the images: that halves the time to the images.
@@ -412,16 +414,23 @@ def _session_texts(opened: Model) -> dict[str, str]:
     times = opened.frames(opened.controls.initial).times
     if 0 < places.view.frame < len(times):
         texts["start"] = f"{1e6 * rounded(float(times[places.view.frame])):.9g} us"
-    if "reflected" in places.given and "camera.reflected" in opened.controls.rows:
-        texts["camera.reflected"] = KELVINS.text(places.reflected)
+    if isinstance(opened, MeasurementModel):
+        texts |= correction_texts(places)
     return texts
 
 
-def _columns(curves: Mapping[str, Array]) -> dict[str, list[float]]:
-    """Return the curves along a line as the page draws them."""
+def _columns(curves: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the curves along a line as the page draws them.
+
+    Bokeh sends arrays as their bytes, and lists number by number, which takes much longer.
+    """
     unknown = np.full_like(curves["along"], np.nan)
     drawn = {"corrected": unknown, **curves}
-    return {key: curve.tolist() for key, curve in drawn.items() if key not in ("low", "high")}
+    return {
+        key: np.asarray(curve, np.float32)
+        for key, curve in drawn.items()
+        if key not in ("low", "high")
+    }
 
 
 def _largest(contributions: Mapping[str, float]) -> dict[str, float]:

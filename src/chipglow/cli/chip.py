@@ -33,10 +33,10 @@ def rake(
     settings: opt.Settings = None,
 ) -> None:
     """Average the radiance temperature in squares along the rake face (the paper's Figure 7)."""
-    from chipglow.cli.tool_choice import chosen_tool
     from chipglow.io.result_file import write_result
     from chipglow.laboratory.chip import ToolUncertainty, rake_grid
     from chipglow.laboratory.chip.figure import draw_rake_grid
+    from chipglow.laboratory.chip.tool_choice import chosen_tool
     from chipglow.laboratory.recordings import load_measurement
 
     measured = load_measurement(measurement, settings or ())
@@ -121,12 +121,12 @@ def shearband(
     settings: opt.Settings = None,
 ) -> None:
     """Read the radiance temperature along the shear band (the paper's Figure 9)."""
-    from chipglow.cli.tool_choice import chosen_tool
     from chipglow.drawing.scales import shown_frame
     from chipglow.io import read_curve
     from chipglow.io.result_file import write_result
     from chipglow.laboratory.chip import band_profile
     from chipglow.laboratory.chip.figure import draw_band_profile
+    from chipglow.laboratory.chip.tool_choice import chosen_tool
     from chipglow.laboratory.recordings import load_measurement
 
     measured = load_measurement(measurement, settings or ())

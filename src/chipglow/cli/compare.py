@@ -57,10 +57,10 @@ def compare(
     settings: opt.Settings = None,
 ) -> None:
     """Compare a measurement with simulations and report the best fit at each place."""
-    from chipglow.cli.tool_choice import chosen_tool
     from chipglow.drawing.scales import shown_frame
     from chipglow.io import read_curve
     from chipglow.laboratory import comparison as lab
+    from chipglow.laboratory.chip.tool_choice import chosen_tool
     from chipglow.laboratory.comparison.coverage import COVERAGE
     from chipglow.laboratory.recordings import load_measurement
 

@@ -2,22 +2,20 @@
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any
 
 from chipglow.cli import options as opt
 from chipglow.cli.chip import chosen_frames
 from chipglow.cli.emissivity import doubts, emissivities_of, origin_of
 from chipglow.cli.screen import current, figure, finish
 
-_LARGEST_MISFIT: Final = 4.0
-"""Misfit above which the residuals are more than twice the noise: not by chance."""
-
 if TYPE_CHECKING:
     import pandas as pd
 
-    from chipglow.camera import Camera, Measurement
+    from chipglow.camera import Measurement, PSFChoice
     from chipglow.correction import Correction
     from chipglow.laboratory.emissivity import PlacesDescription
+    from chipglow.surface import Origin
     from chipglow.text import Notes
 
 
@@ -32,7 +30,13 @@ def correct(
         ),
     ] = None,
     psf: Annotated[
-        Path | None, opt.value("FILE", "Point spread function, output of chipglow psf (NetCDF).")
+        str | None,
+        opt.value(
+            "FILE|CAMERA",
+            "Point spread function, output of chipglow psf (NetCDF), or that of a camera by its "
+            "name (chipglow cameras), from its aperture. Default: as the file of the regions "
+            "states.",
+        ),
     ] = None,
     emissivity: Annotated[
         str | None,
@@ -68,17 +72,19 @@ def correct(
         float | None, opt.value("NUMBER", "Standard uncertainty of an emissivity that states none.")
     ] = None,
     psf_uncertainty: Annotated[
-        float,
+        float | None,
         opt.value(
             "NUMBER",
-            "Relative standard uncertainty of the width of the point spread function, e.g. 0.03.",
+            "Relative standard uncertainty of the width of the point spread function, e.g. 0.03. "
+            "Default: as the file of the regions states, otherwise none.",
         ),
-    ] = 0.0,
+    ] = None,
     outline_uncertainty: Annotated[
         float | None,
         opt.length(
             "Standard uncertainty of the position of the outlines, e.g. '3 um'. If given, the "
-            "position is estimated from the image. Default: that of a found tool, otherwise none."
+            "position is estimated from the image. Default: as the file of the regions states, "
+            "that of a found tool, otherwise none."
         ),
     ] = None,
     reflected: Annotated[
@@ -107,6 +113,7 @@ def correct(
     from chipglow.io.result_file import write_frame
     from chipglow.laboratory.emissivity import load_places
     from chipglow.laboratory.recordings import load_measurement
+    from chipglow.study.measured_corrections import misfit_notes
 
     known = {
         "--emissivity": emissivity,
@@ -129,29 +136,32 @@ def correct(
                 load_study(study),
                 measurement,
                 emissivity_uncertainty=emissivity_uncertainty or 0.0,
-                psf_uncertainty=psf_uncertainty,
+                psf_uncertainty=psf_uncertainty or 0.0,
                 outline_uncertainty=outline_uncertainty or 0.0,
                 noise=noise,
                 progress=progress,
             )
         else:
-            measurement, notes, found = _with_tool(measurement, tool)
-            camera, stated = _camera(measurement, Path(str(psf)))
+            measurement, notes, found = _with_tool(measurement, tool or _stated(described, "tool"))
+            stated = _stated(described, "outline_uncertainty")
+            outlines = (one for one in (outline_uncertainty, stated, found) if one is not None)
+            if psf_uncertainty is None:
+                psf_uncertainty = _stated(described, "psf_uncertainty")
             result = _corrected(
                 measurement,
-                camera,
+                _psf(psf, described, measurement),
                 described,
                 known,
                 emissivity_uncertainty,
-                psf_uncertainty=psf_uncertainty,
-                outline_uncertainty=found if outline_uncertainty is None else outline_uncertainty,
+                psf_uncertainty=psf_uncertainty or 0.0,
+                outline_uncertainty=next(outlines),
                 noise=noise,
                 progress=partial(progress, "correction"),
-            ).with_notes(notes + stated)
+            ).with_notes(notes)
     table_of_places = place_frame(result, places_of(result, measurement, named))
     _print(result, table_of_places)
     finish(
-        measurement.notes + result.notes + _doubts(result),
+        measurement.notes + result.notes + misfit_notes(result),
         (out, partial(write_correction, result)),
         (table, partial(write_frame, table_of_places)),
         (plot, figure(draw_correction, result, measurement)),
@@ -160,12 +170,12 @@ def correct(
 
 def _check_options(
     study: Path | None,
-    psf: Path | None,
+    psf: str | None,
     known: "dict[str, Any]",
     described: "PlacesDescription | None",
 ) -> None:
     """Raise a ValueError if options lack each other or exclude each other."""
-    if study is None and psf is None:
+    if study is None and psf is None and _stated(described, "psf") is None:
         raise ValueError("--psf: is missing; give --psf with --emissivity, or --study")
     given = [name for name, value in known.items() if value is not None]
     if study is not None:
@@ -191,7 +201,7 @@ def _frames(measurement: "Measurement", frame: str) -> "Measurement":
 
 def _with_tool(measurement: "Measurement", tool: str | None) -> "tuple[Measurement, Notes, float]":
     """Return the measurement with the chosen tool, and its standard uncertainty in m if found."""
-    from chipglow.cli.tool_choice import chosen_tool
+    from chipglow.laboratory.chip.tool_choice import chosen_tool
     from chipglow.text import Notes
 
     if tool is None:
@@ -200,36 +210,36 @@ def _with_tool(measurement: "Measurement", tool: str | None) -> "tuple[Measureme
     return measurement.with_tool(chosen), notes, 0.0 if known is None else known.across
 
 
-def _camera(measurement: "Measurement", psf: Path) -> "tuple[Camera, Notes]":
-    """Return a camera with the measurement's band and pixels, and a function from a file."""
-    from chipglow.camera import Camera, MeasuredPSFFile
-    from chipglow.text import Notes
+def _stated(described: "PlacesDescription | None", name: str) -> Any:
+    """Return what the file of the regions states; None without one."""
+    return None if described is None else getattr(described, name)
 
-    choice, band, notes = MeasuredPSFFile(str(psf)), measurement.band, Notes()
-    if choice.psf.band is None:
-        notes = Notes([f"{psf} states no band: it was measured in that of the image."])
-    camera = Camera(
-        band=band,
-        pitch=measurement.raster.spacing,
-        fill_factor=float(measurement.data.attrs.get("fill_factor", 1.0)),
-        psf=choice.for_camera(band, None),
-    )
-    return camera, notes
+
+def _psf(
+    name: str | None, described: "PlacesDescription | None", measurement: "Measurement"
+) -> "PSFChoice":
+    """Return the point spread function of the option, or else of the file of the regions."""
+    from chipglow.study.measured_corrections import psf_choice
+
+    if name is not None:
+        return psf_choice(name, measurement.raster.spacing)
+    psf: PSFChoice = _stated(described, "psf")
+    return psf
 
 
 def _corrected(
     measurement: "Measurement",
-    camera: "Camera",
+    psf: "PSFChoice",
     described: "PlacesDescription | None",
     known: "dict[str, Any]",
     emissivity_uncertainty: float | None,
     **settings: Any,
 ) -> "Correction":
     """Correct a measurement with emissivities of the laboratory."""
-    from chipglow.correction import correct_known, correct_mapped, known_parts
     from chipglow.laboratory import emissivity as lab
+    from chipglow.study.measured_corrections import correct_measured
 
-    tool, file = measurement.tool, known["--map"] or known["--emissivity"]
+    file = known["--map"] or known["--emissivity"]
     places = () if described is None else described.places()
     regions = tuple(place for place in places if place.has_area)
     if described is not None:
@@ -239,31 +249,23 @@ def _corrected(
             known["--reflected"] or lab.LABORATORY, known["--reflected-uncertainty"] or 0.0
         )
     if known["--map"] is not None:
-        shapes: tuple[Any, ...] = regions if tool is None else (*regions, tool)
-        result = correct_mapped(
-            measurement, camera, lab.read_emissivity_map(file), shapes, **settings
-        )
-        return result.with_notes(doubts(lab.read_origin(file), [measurement]))
-    lines = emissivities_of(file, emissivity_uncertainty, described)
-    parts = known_parts(lines, regions, tool, known["--elsewhere"])
-    result = correct_known(measurement, camera, parts, **settings)
-    return result.with_notes(doubts(origin_of(file), [measurement]))
-
-
-def _doubts(result: "Correction") -> "Notes":
-    """Warn of frames that the zones and the point spread function do not explain."""
-    from chipglow.text import Notes
-
-    worst = float(result.data["misfit"].max())
-    if worst <= _LARGEST_MISFIT:
-        return Notes()
-    return Notes(
-        warnings=[
-            f"The corrected image differs from the measured one by {worst**0.5:.2g} times the "
-            "noise: an outline, an emissivity or the point spread function is wrong, or the noise "
-            "is larger than assumed. The intervals do not contain this."
-        ]
+        emissivities: Any = lab.read_emissivity_map(file)
+        origin: Origin | None = lab.read_origin(file)
+    else:
+        emissivities = emissivities_of(file, emissivity_uncertainty, described)
+        origin = origin_of(file)
+    if file is None and described is not None:
+        regions = described.zones()
+    result = correct_measured(
+        measurement,
+        psf,
+        emissivities,
+        regions,
+        measurement.tool,
+        elsewhere=known["--elsewhere"],
+        **settings,
     )
+    return result.with_notes(doubts(origin, [measurement]))
 
 
 def _print(result: "Correction", frame: "pd.DataFrame") -> None:

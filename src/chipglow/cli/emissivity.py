@@ -185,7 +185,7 @@ def temperature(
     if each and study is not None:
         raise ValueError("--each and --study cannot be combined: a study is of one measurement")
     described = lab.load_places(regions)
-    named, surroundings = described.places(), described.surroundings()
+    named, surroundings = lab.load_regions(regions), described.surroundings()
     if reflected is not None or reflected_uncertainty is not None:
         surroundings = lab.reflected_temperature(
             reflected or lab.LABORATORY, reflected_uncertainty or 0.0

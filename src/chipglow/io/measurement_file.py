@@ -32,15 +32,24 @@ def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) ->
 
 
 def write_dataset(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a dataset of moderate size to a NetCDF-4 file, compressed without loss."""
+    """Write a dataset of moderate size to a NetCDF-4 file, compressed without loss.
+
+    Images over time are kept together by frame, so that one frame is read without the others.
+    """
     encoding = {
-        str(name): COMPRESSION
+        str(name): {**COMPRESSION, **_by_frame(variable)}
         for name, variable in data.variables.items()
         if variable.ndim and np.issubdtype(variable.dtype, np.number)
     }
     # HDF5 reads back what it wrote, which a full disk may not have taken: it writes to memory.
     content = data.drop_encoding().to_netcdf(engine="h5netcdf", encoding=encoding)
     write_hdf5(Path(path), lambda sink: sink.write(content))
+
+
+def _by_frame(variable: xr.Variable) -> dict[str, tuple[int, ...]]:
+    if variable.dims != ("time", "y", "x") or 0 in variable.shape:
+        return {}
+    return {"chunksizes": (1, *variable.shape[1:])}
 
 
 def is_measurement(path: str | os.PathLike[str]) -> bool:

@@ -4,19 +4,36 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Final, Literal, TypeAlias
 
-from pydantic import PlainValidator
+from pydantic import BeforeValidator, PlainValidator, ValidationInfo
 
+from chipglow.camera import PSFS, PSFChoice
 from chipglow.laboratory.emissivity.emissivity import LABORATORY, EmissivityLine
 from chipglow.laboratory.emissivity.temperature import reflected_temperature
 from chipglow.quantities import Parameter, Part
-from chipglow.quantities.units import KELVINS, POSITION, TEMPERATURE, TEMPERATURE_DIFFERENCE
+from chipglow.quantities.part import beside_the_study
+from chipglow.quantities.units import KELVINS, LENGTH, POSITION, TEMPERATURE, TEMPERATURE_DIFFERENCE
 from chipglow.scene import Circle, Pixel, Polygon, Polyline, Region
-from chipglow.text import load_described
+from chipglow.scene.regions import named_value
+from chipglow.text import DescriptionError, load_described
 from chipglow.uncertainty import Estimate
 
 Palette: TypeAlias = Literal["inferno", "viridis", "cividis", "grey", "turbo"]
 
+FOUND: Final = "found"
+"""Names the tool that is detected in the image."""
+
+OF_A_CORRECTION: Final = ("tool", "elsewhere")
+"""Names of emissivities that are not those of a place: of the tool, and outside all regions."""
+
 _SHAPES: Final = ("polygon", "rectangle", "circle")
+
+
+def _tool(file: object, info: ValidationInfo) -> object:
+    return file if file == FOUND else beside_the_study(file, info)
+
+
+PSFField = Annotated[PSFChoice, PSFS]
+ToolField = Annotated[str, BeforeValidator(_tool)]
 
 
 def _coordinate(value: object) -> float | str:
@@ -132,7 +149,11 @@ class PlacesDescription(Part):
         dict[str, tuple[PointField, ...]], Parameter("Lines by name, from corner to corner.")
     ] = field(default_factory=dict)
     emissivities: Annotated[
-        dict[str, KnownEmissivity], Parameter("Emissivities by the name of a place or feature.")
+        dict[str, KnownEmissivity],
+        Parameter(
+            "Emissivities by the name of a place or feature; for a correction also 'tool', and "
+            "'elsewhere' for the rest of the image."
+        ),
     ] = field(default_factory=dict)
     reflected: Annotated[
         float, Parameter("Temperature of the reflected surroundings.", KELVINS)
@@ -140,6 +161,26 @@ class PlacesDescription(Part):
     reflected_uncertainty: Annotated[
         float, Parameter("Its standard uncertainty.", TEMPERATURE_DIFFERENCE, least=0.0)
     ] = 0.0
+    psf: Annotated[PSFField | None, Parameter("Point spread function of a correction.")] = None
+    psf_uncertainty: Annotated[
+        float, Parameter("Relative standard uncertainty of its width.", least=0.0)
+    ] = 0.0
+    tool: Annotated[
+        ToolField | None,
+        Parameter(
+            "Tool of a correction: a YAML file, or 'found' to detect it in the image; none: as the "
+            "measurement states.",
+            allowed="none, found, or a file such as tool.yaml",
+        ),
+    ] = None
+    outline_uncertainty: Annotated[
+        float | None,
+        Parameter(
+            "Standard uncertainty of the position of the outlines; none: of a found tool.",
+            LENGTH,
+            least=0.0,
+        ),
+    ] = None
     view: Annotated[ImageView, Parameter("How the app shows the image.")] = field(
         default_factory=ImageView
     )
@@ -147,13 +188,13 @@ class PlacesDescription(Part):
     def __post_init__(self) -> None:
         super().__post_init__()
         places = self.places()
-        if not places:
+        if not places and "view" not in self.given:  # a session may have none
             raise ValueError("regions: there are none, expected 1 region, point or line or more")
         names = [place.name for place in places]
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"{name}: two places have this name, expected unique names")
-        known = {*names, *(place.feature for place in places)}
+        known = {*names, *(place.feature for place in places), *OF_A_CORRECTION}
         for name in self.emissivities.keys() - known:
             raise ValueError(
                 f"emissivities: {name!r} is no place or feature, expected one of {', '.join(known)}"
@@ -165,6 +206,14 @@ class PlacesDescription(Part):
             *(section.region(name) for name, section in self.regions.items()),
             *(_named("points", name, (point,)) for name, point in self.points.items()),
             *(_named("lines", name, corners) for name, corners in self.lines.items()),
+        )
+
+    def zones(self) -> tuple[Region, ...]:
+        """Return the regions with an emissivity, which a correction tells apart."""
+        return tuple(
+            place
+            for place in self.places()
+            if place.has_area and named_value(self.emissivities, place) is not None
         )
 
     def known(self) -> dict[str, EmissivityLine]:
@@ -200,7 +249,7 @@ def _numbers(*coordinates: float | str) -> tuple[list[float], Literal["pixel", "
 
 def is_places(data: object) -> bool:
     """Return whether the content of a YAML file is a file of places."""
-    return isinstance(data, dict) and bool({"regions", "points", "lines"} & data.keys())
+    return isinstance(data, dict) and bool({"regions", "points", "lines", "view"} & data.keys())
 
 
 def load_places(path: str | Path) -> PlacesDescription:
@@ -222,4 +271,7 @@ def load_regions(path: str | Path) -> tuple[Region, ...]:
     path : str or Path
         YAML file of polygons, rectangles, circles, points and lines.
     """
-    return load_places(path).places()
+    places = load_places(path).places()
+    if not places:
+        raise DescriptionError(f"{path}: has no region, point or line; draw one or more")
+    return places

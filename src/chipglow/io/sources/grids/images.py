@@ -2,9 +2,10 @@
 
 import logging
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from functools import partial
+from dataclasses import replace
+from functools import lru_cache, partial
 from math import isfinite, prod
 from pathlib import Path
 from typing import Any, Final
@@ -86,11 +87,30 @@ _NO_FUNCTION: Final = 20
 
 def tiff_arrays(path: Path, stack: ExitStack) -> Iterator[FileArray]:
     """Yield the series of grey images in a TIFF file, and its times if it states them."""
+    status = path.stat()
+    file, arrays = _tiff(path, status.st_size, status.st_mtime_ns)
+    file.filehandle.open()
+    stack.callback(file.filehandle.close)
+    yield from (replace(one, notes=one.notes + Notes()) for one in arrays)
+
+
+@lru_cache(maxsize=1)
+def _tiff(path: Path, _size: int, _changed: int) -> tuple[Any, tuple[FileArray, ...]]:
+    """Return a TIFF file, which is closed, and its arrays.
+
+    The last one is kept: one who looks at frame after frame reads the tags of all images once.
+    """
     import tifffile
 
-    with _errors_logged("tifffile") as errors:
-        file = stack.enter_context(tifffile.TiffFile(path))
+    with _errors_logged("tifffile") as errors, tifffile.TiffFile(path) as file:
         every = list(file.series)
+        return file, tuple(_tiff_series(path, file, every, errors))
+
+
+def _tiff_series(
+    path: Path, file: Any, every: Sequence[Any], errors: Sequence[str]
+) -> Iterator[FileArray]:
+    """Yield the series of grey images, and their times; an error of tifffile is one."""
     if errors:
         raise SourceError(f"{path}: is damaged or truncated: {errors[0]}")
     reasons = {number: _not_grey(series) for number, series in enumerate(every, start=1)}
@@ -346,11 +366,12 @@ def _tiff_reader(path: Path, series: Any) -> Read:
     if series.dataoffset is not None:
         dtype = np.dtype(series.parent.byteorder + series.dtype.char)
         return partial(_mapped_part, path, dtype, series.dataoffset, tuple(series.shape))
-    for page in series.pages:
+    pages = list(series.pages)
+    for page in pages:
         ends = [a + n for a, n in zip(page.dataoffsets, page.databytecounts, strict=True)]
         if max(ends, default=0) > path.stat().st_size:
             raise SourceError(f"{path}: is truncated, a picture ends at byte {max(ends)}")
-    return partial(_pages_part, path, series)
+    return partial(_pages_part, path, series, pages)
 
 
 def _mapped_part(
@@ -360,10 +381,10 @@ def _mapped_part(
     return np.array(np.memmap(path, dtype, "r", offset, shape)[key])
 
 
-def _pages_part(path: Path, series: Any, key: Key) -> NDArray[Any]:
+def _pages_part(path: Path, series: Any, every: Sequence[Any], key: Key) -> NDArray[Any]:
     if series.axes.startswith("S"):
-        return np.asarray(_decoded(path, series.pages[0])[key])
-    pages = list(series.pages)[key[0]] if len(series.shape) > 2 else list(series.pages)
+        return np.asarray(_decoded(path, every[0])[key])
+    pages = every[key[0]] if len(series.shape) > 2 else every
     check_samples(str(path), len(pages) * prod(series.shape[-2:]))
     part = np.stack([_decoded(path, page)[key[-2:]] for page in pages])
     return part[0] if len(series.shape) == 2 else part

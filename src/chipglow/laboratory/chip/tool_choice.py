@@ -1,4 +1,4 @@
-"""The tool as commands name it: in a file, or found in the image."""
+"""The tool as commands and the app name it: in a file, or found in the image."""
 
 from math import degrees, hypot
 from typing import Final
@@ -9,6 +9,7 @@ from chipglow.camera import Measurement
 from chipglow.io import load_tool
 from chipglow.laboratory.chip.find_tool import FoundTool, find_tool
 from chipglow.laboratory.chip.tool_position import ToolUncertainty, tool_of
+from chipglow.laboratory.emissivity.places import FOUND
 from chipglow.quantities import uncertainty_text
 from chipglow.scene import Tool
 from chipglow.text import Notes
@@ -22,10 +23,10 @@ _CLEARLY: Final = 4.0
 def chosen_tool(
     measurement: Measurement, tool: str | None, position: float | None = None
 ) -> tuple[Tool, ToolUncertainty | None, Notes]:
-    """Return the tool of an option ``--tool``, and the uncertainty of its place if it was found."""
+    """Return a tool: the measurement's, of a file, or `FOUND`; and its uncertainty if found."""
     if tool is None:
         return tool_of(measurement, None), None, Notes()
-    if tool != "found":
+    if tool != FOUND:
         given = load_tool(tool)
         return given, None, Notes(warnings=_contradictions(measurement, given))
     found = find_tool(measurement)
