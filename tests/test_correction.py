@@ -291,8 +291,8 @@ def test_the_radiance_continues_beyond_the_image():
     result = correct(image, CAMERA, [Zone("plate", 0.5)], surroundings=DARK, noise=0.1)
     error = result.data["temperature"][0].values - field(*np.meshgrid(pixels.x, pixels.y))
     mean = error[4:-4, 4:-4].mean()
-    # Without the slope of the radiance beyond the image, the mean is 1.3 K too low.
-    assert abs(mean) < 0.8
+    # Without the slope of the radiance beyond the image, the mean is 2.6 K too low.
+    assert abs(mean) < 1.3
     assert abs(mean) < float(result.at(inside(error, 4)).expanded_uncertainty())
 
 
