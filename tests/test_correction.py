@@ -296,6 +296,28 @@ def test_the_radiance_continues_beyond_the_image():
     assert abs(mean) < float(result.at(inside(error, 4)).expanded_uncertainty())
 
 
+def test_an_interval_contains_light_that_is_not_beyond_the_image():
+    """A hot corner of a cold image: its light from beyond is assumed, and is not there."""
+    pixels = Raster(0.0, 24 * PITCH, PITCH, 24, 24)
+
+    def field(x, y):
+        distance = np.hypot(x / PITCH - 24, y / PITCH - 24)
+        return 350.0 + 550.0 * np.exp(-distance / 14)
+
+    samples = around(pixels, 4)
+    light = 0.5 * BAND.radiance(field(*np.meshgrid(samples.x, samples.y)))
+    image = image_formation(CAMERA, samples, pixels=pixels).forward(light)
+    image += np.random.default_rng(1).normal(0, 0.1 * float(BAND.slope(600.0)), image.shape)
+    image = Measurement.from_radiance(image[None], BAND, np.zeros(1), pixels, 573.15)
+    result = correct(image, CAMERA, [Zone("plate", 0.5)], surroundings=DARK, noise=0.1)
+    found = result.data["temperature"][0].values
+    judged = np.isfinite(found) & inside(found, 4)
+    error = (found - field(*np.meshgrid(pixels.x, pixels.y)))[judged].mean()
+    # The assumed light makes it 9 K too cold; the noise, of 0.1 K, hardly counts.
+    assert -12.0 < error < -6.0
+    assert abs(error) < float(result.at(judged).expanded_uncertainty())
+
+
 def test_cells_form_the_image_of_a_cut_object():
     """Cells half as wide as a pixel and samples of a sixteenth form the same image."""
     pixels = Raster(0.0, 10 * PITCH, PITCH, 10, 10)

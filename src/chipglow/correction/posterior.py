@@ -26,8 +26,7 @@ A longer step is shortened as a whole: if single values were limited, the soluti
 and the objective would not decrease."""
 
 _STEPS: Final = 20
-"""Most steps for each estimate of the weights. Few need more than 4; with these, some scenes ended
-10 K too cold."""
+"""Most steps for each estimate of the weights. Few need more than 10."""
 
 _MOST_HALVINGS: Final = 8
 """Most halvings of a step that does not decrease the objective; the shortest is 1/128 of it."""
@@ -72,7 +71,7 @@ _START_CURVATURE: Final = 0.02
 _SLOPE: Final = 1.0
 """Standard deviation of slopes per cell, of the logarithm of radiance.
 
-It is five times the slope at a rake face, and bounds those where there are hardly any data.
+It is three times that of 100 K per pixel at 700 K. It bounds slopes where there are hardly any data.
 """
 
 _ROUNDS: Final = 3
@@ -118,9 +117,10 @@ class Problem:
 
     x is the logarithm of the blackbody radiance of each zone at the centres of its cells, C the
     interpolation to the centroids of the parts, a ε the parts' area and emissivity, A the formation
-    of the image, D the curvatures within zones. `reflected` is the image of the reflected radiance.
-    With `beyond`, the light from beyond the parts follows from a former solution. It is not solved
-    for: parts at the edge that stood for all of it would have the influence of many.
+    of the image, D the curvatures within zones; slopes have a weak prior. `reflected` is the image
+    of the reflected radiance. With `beyond`, the light from beyond the parts follows from a former
+    solution. It is not solved for: parts at the edge that stood for all of it would have the
+    influence of many.
     """
 
     image: Image
@@ -134,7 +134,9 @@ class Problem:
     weights: Array = field(init=False)
     """Weights w of the curvatures."""
     bending: Any = field(init=False)
-    """Sparse array Dᵀ w D, (part, part)."""
+    """Sparse array Dᵀ w D, and that of the slopes, (part, part)."""
+    slopes: Any = field(init=False)
+    """Sparse array (difference, part) of slopes in their standard deviations."""
 
     def __post_init__(self) -> None:
         self.from_beyond = np.zeros_like(self.reflected)
@@ -276,7 +278,7 @@ class Posterior:
 
     @cached_property
     def objective(self) -> float:
-        """½ Σ (y − A g)² / σ² + ½ Σ w (D x)², which the solution minimises."""
+        """½ Σ (y − A g)² / σ² + ½ Σ w (D x)² + ½ Σ (slope)², which the solution minimises."""
         data = (self.pixel_weights * self.residual**2).sum()
         return float(data + self.x @ (self.bending @ self.x)) / 2
 
