@@ -16,7 +16,7 @@ ResultFolder = Annotated[Path, opt.folder("Results folder; earlier results are r
 
 def reproduce(
     quick: Annotated[
-        bool, opt.flag("--quick", "Use coarse cells and samples; takes about a minute.")
+        bool, opt.flag("--quick", "Use coarse cells and samples; takes one to four minutes.")
     ] = False,
     steady_tool: Annotated[
         bool,

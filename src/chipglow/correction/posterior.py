@@ -71,7 +71,7 @@ _START_CURVATURE: Final = 0.02
 _SLOPE: Final = 1.0
 """Standard deviation of slopes per cell, of the logarithm of radiance.
 
-It is three times that of 100 K per pixel at 700 K. It bounds slopes where there are hardly any data.
+It is three times that of 100 K per pixel at 700 K, and bounds slopes where there are few data.
 """
 
 _ROUNDS: Final = 3
