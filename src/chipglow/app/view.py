@@ -426,11 +426,7 @@ def _columns(curves: Mapping[str, Array]) -> dict[str, Array]:
     """
     unknown = np.full_like(curves["along"], np.nan)
     drawn = {"corrected": unknown, **curves}
-    return {
-        key: np.asarray(curve, np.float32)
-        for key, curve in drawn.items()
-        if key not in ("low", "high")
-    }
+    return {key: np.asarray(curve) for key, curve in drawn.items() if key not in ("low", "high")}
 
 
 def _largest(contributions: Mapping[str, float]) -> dict[str, float]:
