@@ -1,7 +1,6 @@
 """Files of cameras and other programs in the app: their settings, correction, and two cameras."""
 
 import os
-from threading import Event
 from types import SimpleNamespace
 
 import camera_files
@@ -19,7 +18,6 @@ from chipglow.app.controls import CORRECTION_IMAGES
 from chipglow.app.marks import Mark
 from chipglow.app.opening import Asking, OpenFiles, open_any
 from chipglow.app.scene_model import SceneModel
-from chipglow.app.view import PageView
 from chipglow.camera import Camera, GaussianPSF, Measurement
 from chipglow.correction import correct_known, known_parts, read_correction, surroundings_of
 from chipglow.io import write_measurement
@@ -32,6 +30,9 @@ from chipglow.laboratory.recordings import CameraFrames, load_description, load_
 from chipglow.quantities import ZERO_CELSIUS
 
 pytest.importorskip("panel", reason="needs the extra app")
+from app_page import shown
+
+from chipglow.app.view import PageView
 
 BOX = ((240e-6, 190e-6), (280e-6, 230e-6))
 KELVINS = {"unit": "0.1 K", "interval": "1 ms", "pitch": "15 um", "band": "3.8-5.1 um"}
@@ -68,17 +69,6 @@ def files():
 
 def opened(files, path, settings):
     return files._answered(open_any(path), "measurement", settings)
-
-
-def shown(path):
-    """A page of a file whose picture is shown."""
-    view = PageView(open_any(path), embedded=True)
-    view.start(None)
-    is_shown = Event()
-    view.opened.watch(is_shown.set)
-    view.session.show()
-    assert is_shown.wait(60.0)  # s: of a machine with much else to do
-    return view
 
 
 def typed(settings):

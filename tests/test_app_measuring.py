@@ -3,7 +3,6 @@
 import time
 from dataclasses import replace
 from io import BytesIO
-from threading import Event
 
 import numpy as np
 import pandas as pd
@@ -22,9 +21,7 @@ from chipglow.laboratory.emissivity.places import KnownEmissivity
 from chipglow.laboratory.readings import place_curves, read_places
 
 pytest.importorskip("panel", reason="needs the extra app")
-from chipglow.app.view import PageView
-
-PATIENCE = 60.0  # s: of a machine with much else to do
+from app_page import PATIENCE, shown
 
 BOX = ((150e-6, 150e-6), (300e-6, 240e-6))
 SHAPES = {
@@ -34,17 +31,6 @@ SHAPES = {
     "circle": ((240e-6, 200e-6), (260e-6, 200e-6)),
     "polygon": ((100e-6, 100e-6), (300e-6, 120e-6), (200e-6, 260e-6)),
 }
-
-
-def shown(path):
-    """A page of a file whose picture is shown."""
-    view = PageView(open_any(path), embedded=True)
-    view.start(None)
-    is_shown = Event()
-    view.opened.watch(is_shown.set)
-    view.session.show()
-    assert is_shown.wait(PATIENCE)
-    return view
 
 
 def until(is_true):

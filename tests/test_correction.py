@@ -292,7 +292,7 @@ def test_the_radiance_continues_beyond_the_image():
     error = result.data["temperature"][0].values - field(*np.meshgrid(pixels.x, pixels.y))
     mean = error[4:-4, 4:-4].mean()
     # Without the slope of the radiance beyond the image, the mean is 2.6 K too low.
-    assert abs(mean) < 1.3
+    assert abs(mean) < 0.9  # a third of it: the slopes fade, those of the field do less
     assert abs(mean) < float(result.at(inside(error, 4)).expanded_uncertainty())
 
 

@@ -233,6 +233,7 @@ def test_the_posterior_is_that_of_dense_matrices():
     # Outlines are located to 1/4096 of a cell, so that the parts beside it send 2.4e-4 less light.
     last_step = 2e-3 * np.sqrt(light.size) * spread
     assert (np.abs(found.x[order] - best) < last_step + 2.4e-4).all()
+    assert spread.min() > 2e-3  # so that the latter is an eighth of the least standard uncertainty
 
     _, hessian = chip.linearised(found.x[order], light, precision)
     covariance = linalg.inv(hessian)

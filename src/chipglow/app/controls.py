@@ -418,8 +418,7 @@ class Controls:
     ) -> "Controls":
         """Return the controls of a measurement: those of its frames and of their correction."""
         none = {"camera.psf": "none", "camera.blur": ()}
-        known = {"camera.psf": "none", "camera.blur": (), "camera.reflected": REFLECTED}
-        study = changed(study, known)
+        study = changed(study, {**none, "camera.reflected": REFLECTED})
         frames = cls.of_frames(study, times, raster)
         options = {
             "camera.psf": {

@@ -5,9 +5,8 @@ from typing import Any
 
 from chipglow.app.controls import PSF_FILE, SESSION_PSF, ShownStudy
 from chipglow.camera import MeasuredPSFFile
-from chipglow.correction.known import ELSEWHERE, TOOL
 from chipglow.laboratory.emissivity import PlacesDescription
-from chipglow.laboratory.emissivity.places import FOUND, PSFField
+from chipglow.laboratory.emissivity.places import ELSEWHERE, FOUND, TOOL, PSFField
 from chipglow.quantities import adapter
 from chipglow.quantities.units import KELVINS, LENGTH, TEMPERATURE_DIFFERENCE
 

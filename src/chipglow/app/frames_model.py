@@ -36,10 +36,10 @@ from chipglow.app.pictures import (
 from chipglow.camera import MeasuredPSFFile, Measurement, PSFChoice
 from chipglow.camera.exposure_kernels import Check
 from chipglow.correction import Correction
-from chipglow.correction.known import ELSEWHERE, TOOL
-from chipglow.laboratory.chip.tool_choice import chosen_tool
+from chipglow.correction.zones import covers_a_pixel
+from chipglow.laboratory.chip.tool_choice import with_chosen_tool
 from chipglow.laboratory.emissivity import EmissivityLine, PlacesDescription, reflected_temperature
-from chipglow.laboratory.emissivity.places import KnownEmissivity
+from chipglow.laboratory.emissivity.places import ELSEWHERE, TOOL, KnownEmissivity
 from chipglow.quantities import Array
 from chipglow.quantities.units import COLDEST
 from chipglow.scene import Raster, Region, Tool
@@ -209,11 +209,14 @@ class MeasurementModel(_FramesModel):
         """Return a picture with the corrected image; `check` takes the completed fraction."""
         state, study = picture.state, picture.state.study
         measurement = self.measured.measurement(self.frame(state))
-        tool, outline_uncertainty, notes = _tool(measurement, study)
+        measurement, notes, found = with_chosen_tool(measurement, study.tool)
+        stated = study.outline_uncertainty
         rows, columns = self._part(state)
         regions = [one for one in self.regions if one.mask(self.raster)[rows, columns].any()]
         part = measurement.part(rows=rows, columns=columns)
-        tool = tool if tool is not None and _reaches(tool, part.raster) else None
+        tool = part.tool
+        if tool is not None and not covers_a_pixel(tool, part.raster):
+            tool = None
         lines = _emissivities(study, {one: self.regions[one] for one in regions}, tool)
         if not lines:
             raise ValueError(
@@ -231,7 +234,7 @@ class MeasurementModel(_FramesModel):
                 study.reflected_uncertainty,
             ),
             psf_uncertainty=study.psf_uncertainty,
-            outline_uncertainty=outline_uncertainty,
+            outline_uncertainty=found if stated is None else stated,
             progress=check,
         )
         result = result.with_notes(notes + misfit_notes(result))
@@ -275,21 +278,6 @@ def psf_of(study: ShownStudy) -> PSFChoice:
         return MeasuredPSFFile(str(study.psf_file))
     assert study.camera.psf is not None
     return study.camera.psf
-
-
-def _tool(measurement: Measurement, study: ShownStudy) -> tuple[Tool | None, float, Notes]:
-    """Return the tool of a frame, and the standard uncertainty of its outline in m."""
-    tool, known, notes = measurement.tool, None, Notes()
-    if study.tool is not None:
-        tool, known, notes = chosen_tool(measurement, study.tool)
-    found = 0.0 if known is None else known.across
-    given = study.outline_uncertainty
-    return tool, found if given is None else given, notes
-
-
-def _reaches(tool: Tool, raster: Raster) -> bool:
-    """Return whether a tool covers the centre of a pixel."""
-    return bool((tool.signed_distance(*np.meshgrid(raster.x, raster.y)) < 0).any())
 
 
 def _emissivities(

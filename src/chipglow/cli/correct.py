@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from chipglow.correction import Correction
     from chipglow.laboratory.emissivity import PlacesDescription
     from chipglow.surface import Origin
-    from chipglow.text import Notes
 
 
 def correct(
@@ -111,6 +110,7 @@ def correct(
     from chipglow.correction import place_frame, places_of, write_correction
     from chipglow.correction.figure import draw_correction
     from chipglow.io.result_file import write_frame
+    from chipglow.laboratory.chip.tool_choice import with_chosen_tool
     from chipglow.laboratory.emissivity import load_places
     from chipglow.laboratory.recordings import load_measurement
     from chipglow.study.measured_corrections import misfit_notes
@@ -142,7 +142,8 @@ def correct(
                 progress=progress,
             )
         else:
-            measurement, notes, found = _with_tool(measurement, tool or _stated(described, "tool"))
+            chosen = tool or _stated(described, "tool")
+            measurement, notes, found = with_chosen_tool(measurement, chosen)
             stated = _stated(described, "outline_uncertainty")
             outlines = (one for one in (outline_uncertainty, stated, found) if one is not None)
             if psf_uncertainty is None:
@@ -197,17 +198,6 @@ def _frames(measurement: "Measurement", frame: str) -> "Measurement":
 
     frames = chosen_frames(measurement, frame, None)
     return measurement if frames is None else Measurement(measurement.data.isel(time=frames))
-
-
-def _with_tool(measurement: "Measurement", tool: str | None) -> "tuple[Measurement, Notes, float]":
-    """Return the measurement with the chosen tool, and its standard uncertainty in m if found."""
-    from chipglow.laboratory.chip.tool_choice import chosen_tool
-    from chipglow.text import Notes
-
-    if tool is None:
-        return measurement, Notes(), 0.0
-    chosen, known, notes = chosen_tool(measurement, tool)
-    return measurement.with_tool(chosen), notes, 0.0 if known is None else known.across
 
 
 def _stated(described: "PlacesDescription | None", name: str) -> Any:

@@ -73,9 +73,8 @@ class Beyond:
         chosen = np.flatnonzero(within)
         solved = parts.within(outer)
         inner = solved.chosen(chosen)
-        return cls(
-            solved, inner, chosen, outer, replace(formation, samples=outer.cells, beyond="edge")
-        )
+        whole = replace(formation, samples=outer.cells, beyond="edge")
+        return cls(solved, inner, chosen, outer, whole)
 
     def continuation(self, x: Array) -> Array:
         """Return the values of the outer parts that minimise curvatures and fading slopes.
@@ -106,9 +105,9 @@ class Beyond:
         values[margin] = continuation[index[margin]]
         return values
 
-    def errors(self, x: Array) -> list[Array]:
+    def errors(self, values: Array) -> list[Array]:
         """Return the changes of the image by one standard uncertainty of each side's light."""
-        light = _DOUBT * self._light(self.continuation(x))
+        light = _DOUBT * self._light(values)
         return [self._seen(light, self._outside & (self._side == side)) for side in range(4)]
 
     def constant(self, x: Array) -> Array:
@@ -149,14 +148,14 @@ class Beyond:
         own = self._roughness[unknown][:, unknown]
         return splu(sparse.csc_array(own + _RIDGE * sparse.eye_array(unknown.size)))
 
-    @property
+    @cached_property
     def _outside(self) -> NDArray[np.bool_]:
         reach = CELLS_PER_PIXEL * _REACH
         outside = np.ones(self.outer.cells.shape, np.bool_)
         outside[reach:-reach, reach:-reach] = False
         return outside
 
-    @property
+    @cached_property
     def _side(self) -> NDArray[np.intp]:
         """Side beyond which each cell is: 0 to 3, by the larger distance at a corner."""
         rows, columns = self.outer.cells.shape

@@ -126,9 +126,8 @@ def correct(
     weights w follow from the data around each place by expectation maximisation. Beyond the image
     the radiance continues with slopes that fade over 16 pixels; that light has a relative standard
     uncertainty of 75 %. The bias of the prior is estimated from the solution and corrected once.
-    Uncertainties are propagated by the linearised solution:
-    systematic errors by one change each, random fields by draws. The temperature belongs to the
-    mean radiance over pixel and exposure.
+    Uncertainties are propagated by the linearised solution: systematic errors by one change each,
+    random fields by draws. The temperature belongs to the mean radiance over pixel and exposure.
     """
     if isinstance(zones, ObservedObject):
         observed = zones

@@ -6,15 +6,10 @@ from typing import Final
 
 from chipglow.correction.zones import Zone
 from chipglow.laboratory.emissivity import EmissivityLine
+from chipglow.laboratory.emissivity.places import ELSEWHERE, TOOL
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Region, Tool
 from chipglow.scene.regions import named_value
-
-TOOL: Final = "tool"
-"""Name of the tool's emissivity and zone."""
-
-ELSEWHERE: Final = "elsewhere"
-"""Name of the rest of the image."""
 
 GRAIN: Final = 20e-6
 """Length in m over which emissivity changes if it is not known: the paper's grain."""

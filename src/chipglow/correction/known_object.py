@@ -12,7 +12,7 @@ from chipglow.camera import Camera, Flag, Measurement
 from chipglow.correction.cells import cells_of
 from chipglow.correction.correct import correct
 from chipglow.correction.correction import Correction, joined
-from chipglow.correction.known import ELSEWHERE, TOOL, KnownPart
+from chipglow.correction.known import KnownPart
 from chipglow.correction.zones import (
     AT_REST,
     Labels,
@@ -23,6 +23,7 @@ from chipglow.correction.zones import (
     check_tools,
 )
 from chipglow.laboratory.emissivity import EmissivityLine, reflected_temperature
+from chipglow.laboratory.emissivity.places import ELSEWHERE, TOOL
 from chipglow.laboratory.emissivity.temperature import FAR
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.quantities.units import COLDEST

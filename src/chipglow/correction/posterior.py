@@ -205,9 +205,8 @@ class Problem:
         """Continue a solution beyond the image, and return it as a start."""
         if self.beyond is None:
             return posterior.x
-        continuation = self.beyond.continuation(posterior.x)
-        self.from_beyond = self.beyond.image(continuation)
-        return self.beyond.with_margin(posterior.x, continuation)
+        self.from_beyond = self.beyond.image(posterior.beyond)
+        return self.beyond.with_margin(posterior.x, posterior.beyond)
 
     def _start(self) -> Array:
         """Return the solution without blur: each cell has the radiance of its pixel."""
@@ -275,6 +274,12 @@ class Posterior:
         counted = self.pixel_weights > 0
         squares = self.residual[counted] ** 2 * self.pixel_weights[counted]
         return float(squares.mean()) if counted.any() else 0.0
+
+    @cached_property
+    def beyond(self) -> Array:
+        """Values of the parts beyond the image, of a problem that continues it."""
+        assert self.problem.beyond is not None
+        return self.problem.beyond.continuation(self.x)
 
     @cached_property
     def objective(self) -> float:

@@ -201,7 +201,7 @@ def _image_with(posterior: Posterior, psf: PointSpreadFunction) -> Array:
     problem = posterior.problem
     image = replace(problem.formation, psf=psf).forward(posterior.light)
     if problem.beyond is not None:
-        image += problem.beyond.image(problem.beyond.continuation(posterior.x), psf)
+        image += problem.beyond.image(posterior.beyond, psf)
     return image
 
 
@@ -222,7 +222,7 @@ def _range_images(posterior: Posterior) -> list[Array]:
 def _border_images(posterior: Posterior) -> list[Array]:
     """Return the change of the image by the radiance beyond each side of it."""
     beyond = posterior.problem.beyond
-    return [] if beyond is None else beyond.errors(posterior.x)
+    return [] if beyond is None else beyond.errors(posterior.beyond)
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,11 +65,15 @@ class Zone:
             raise ValueError(f"zone {self.name}: grain is {self.grain!r} m, must be above 0 m")
 
 
+def covers_a_pixel(tool: Tool, pixels: Raster) -> bool:
+    """Return whether a tool covers the centre of a pixel."""
+    return bool(_inside(tool, pixels, *np.meshgrid(pixels.x, pixels.y)).any())
+
+
 def check_tools(shapes: Iterable[Region | Tool | None], pixels: Raster) -> None:
     """Raise a ValueError if a tool covers no pixel's centre: its place is wrong."""
-    places = np.meshgrid(pixels.x, pixels.y)
     for tool in shapes:
-        if isinstance(tool, Tool) and not _inside(tool, pixels, *places).any():
+        if isinstance(tool, Tool) and not covers_a_pixel(tool, pixels):
             left, right, bottom, top = (1e6 * edge for edge in pixels.extent)
             x, y = (1e6 * float(place) for place in tool.tip)
             raise ValueError(

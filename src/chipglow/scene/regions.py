@@ -12,8 +12,8 @@ from chipglow.quantities import Brief
 from chipglow.scene.lines import Line, nearest_sample, polyline
 from chipglow.scene.raster import Raster
 
-Point: TypeAlias = tuple[float, float]
 Value = TypeVar("Value")
+Point: TypeAlias = tuple[float, float]
 """Column and row in pixels from the image's upper left corner, or x and y in m."""
 
 _CIRCLE_POINTS: Final = 72

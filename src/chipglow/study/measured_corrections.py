@@ -16,6 +16,9 @@ from chipglow.uncertainty import Estimate
 _LARGEST_MISFIT: Final = 4.0
 """Misfit above which the residuals are more than twice the noise: not by chance."""
 
+_APERTURE: Final = frozenset({"psf", "detector_pitch"})
+"""What a preset states from which its aperture at a magnification follows."""
+
 
 def correct_measured(
     measurement: Measurement,
@@ -104,17 +107,17 @@ def psf_choice(name: str, pitch: float) -> PSFChoice:
     """
     if name not in CAMERAS:
         return MeasuredPSFFile(name)
-    preset = CAMERAS[name]
-    if not {"psf", "detector_pitch"} <= preset.keys():
+    if name not in cameras_with_aperture():
         raise ValueError(f"{name}: its data sheet states no aperture; give a file or another PSF")
-    section = CameraSection(**{key: preset[key] for key in ("psf", "detector_pitch")}, pitch=pitch)
+    stated = {key: CAMERAS[name][key] for key in _APERTURE}
+    section = CameraSection(**stated, pitch=pitch)
     assert isinstance(section.psf, AiryAperture)
     return AiryAperture(numerical_aperture=section.psf.aperture(section.magnification))
 
 
 def cameras_with_aperture() -> tuple[str, ...]:
     """Return the names of the cameras whose data sheets state aperture and pitch."""
-    return tuple(name for name, one in CAMERAS.items() if {"psf", "detector_pitch"} <= one.keys())
+    return tuple(name for name, one in CAMERAS.items() if one.keys() >= _APERTURE)
 
 
 def misfit_notes(result: Correction) -> Notes:

@@ -20,6 +20,19 @@ _CLEARLY: Final = 4.0
 """Two places of the face differ if they are this many standard uncertainties apart, or more."""
 
 
+def with_chosen_tool(
+    measurement: Measurement, tool: str | None
+) -> tuple[Measurement, Notes, float]:
+    """Return a measurement with a tool, and the tool's standard uncertainty in m if found.
+
+    Without a choice it keeps its own tool, or none.
+    """
+    if tool is None:
+        return measurement, Notes(), 0.0
+    chosen, known, notes = chosen_tool(measurement, tool)
+    return measurement.with_tool(chosen), notes, 0.0 if known is None else known.across
+
+
 def chosen_tool(
     measurement: Measurement, tool: str | None, position: float | None = None
 ) -> tuple[Tool, ToolUncertainty | None, Notes]:

@@ -22,8 +22,14 @@ Palette: TypeAlias = Literal["inferno", "viridis", "cividis", "grey", "turbo"]
 FOUND: Final = "found"
 """Names the tool that is detected in the image."""
 
-OF_A_CORRECTION: Final = ("tool", "elsewhere")
-"""Names of emissivities that are not those of a place: of the tool, and outside all regions."""
+TOOL: Final = "tool"
+"""Name of the tool's emissivity and zone."""
+
+ELSEWHERE: Final = "elsewhere"
+"""Name of the rest of the image."""
+
+OF_A_CORRECTION: Final = (TOOL, ELSEWHERE)
+"""Names of emissivities that are not those of a place."""
 
 _SHAPES: Final = ("polygon", "rectangle", "circle")
 
