@@ -2,8 +2,8 @@
 
     python benchmarks/fuzz/fuzz.py [--cases 100000] [--only .vtu .npz] [--processes 2] [--log FILE]
 
-Files of every format, YAML of every kind and messages to the app are damaged, and each is read in a
-fork of this process, with limits of memory and time as the product sets them. Whatever is no plain
+Files of every format, YAML of every kind and messages to the app are damaged, and read in forks of
+this process, with limits of memory and time as the product sets them. Whatever is no plain
 refusal is read once more the way the product does, in `chipglow.io.sandbox` where it uses one, and
 has to end in one error there (three of a kind and hundred cases).
 
@@ -96,31 +96,75 @@ def changed(content, random):
     return json.dumps(message).encode()
 
 
-def outcome_of(read, alone):
-    """One of `OUTCOMES`: how reading in a fork ends; alone, the sandbox is this fork."""
-    child = os.fork()
-    if child:
-        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-        return "hang" if code == -signal.SIGALRM else "crash" if code < 0 else OUTCOMES[code]
-    devnull = os.open(os.devnull, os.O_RDWR)
-    for number in range(3):
-        os.dup2(devnull, number)
-    if alone:
-        Sandbox.answer = lambda self, function: function()
-        limit_memory(MEMORY)
-        signal.alarm(PATIENCE)
-    else:
-        signal.alarm(1000)
-    code = OUTCOMES.index("read")
+def outcomes_of(prepare, read, numbers):
+    """Return how reading ends, one of `OUTCOMES` for each case, in forks without a sandbox.
+
+    A fork reads one case after another, until one ends it. Memory that runs out after other cases
+    may be theirs: such a case is read once more, in a fork of its own.
+    """
+    found, numbers = [], list(numbers)
+    while len(found) < len(numbers) and found.count("hang") < ENOUGH_HANGS:
+        ended, code = _read_in_fork(partial(_read_alone, prepare, read), numbers[len(found) :])
+        if ended[-1:] == ["memory"] and len(ended) > 1:
+            ended.pop()
+        elif code < 0:
+            ended.append("hang" if code == -signal.SIGALRM else "crash")
+        found += ended
+    return found
+
+
+def outcome_in_product(read):
+    """Return how reading ends as the product does it, one of `OUTCOMES`."""
+    ended, code = _read_in_fork(lambda number: _outcome(read, 1000), [0])
+    return ended[0] if ended else "hang" if code == -signal.SIGALRM else "crash"
+
+
+def _read_alone(prepare, read, number):
+    prepare(number)
+    Sandbox.answer = lambda self, function: function()
+    limit_memory(MEMORY)
+    return _outcome(read, PATIENCE)
+
+
+def _outcome(read, patience):
+    signal.alarm(patience)
     try:
         read()
+        return "read"
     except MemoryError:
-        code = OUTCOMES.index("memory")
+        return "memory"
     except (ValueError, OSError):
-        code = OUTCOMES.index("refused")
+        return "refused"
     except BaseException:
-        code = OUTCOMES.index("stumbled")
-    os._exit(code)
+        return "stumbled"
+    finally:
+        signal.alarm(0)
+
+
+def _read_in_fork(outcome, numbers):
+    """Return the outcomes of cases in one fork, and the code with which it ended."""
+    receiver, sender = os.pipe()
+    child = os.fork()
+    if not child:
+        _report_outcomes(outcome, numbers, sender)
+    os.close(sender)
+    with os.fdopen(receiver, "rb") as pipe:
+        ended = [OUTCOMES[code] for code in pipe.read()]
+    return ended, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def _report_outcomes(outcome, numbers, sender):
+    try:
+        devnull = os.open(os.devnull, os.O_RDWR)
+        for number in range(3):
+            os.dup2(devnull, number)
+        for number in numbers:
+            found = outcome(number)
+            os.write(sender, bytes([OUTCOMES.index(found)]))
+            if found == "memory":
+                break
+    finally:
+        os._exit(0)
 
 
 def fuzz(contents, chunk):
@@ -128,23 +172,27 @@ def fuzz(contents, chunk):
     name, first, last = chunk
     counts, escaped, begin = Counter(), [], perf_counter()
     target, path = target_of(Path.cwd(), name), Path(name)
-    others, snippets = list(contents.values()), SNIPPETS if name.endswith(".yaml") else ()
-    for number in range(first, last):
-        random = Random(f"{name} {number}")
-        if name.endswith(".message"):
-            path.write_bytes(changed(contents[name], random))
-        else:
-            path.write_bytes(damaged(contents[name], random.choice(others), random, snippets))
-        outcome = outcome_of(target.alone, alone=True)
+    prepare = partial(write_case, contents, name)
+    for number, outcome in enumerate(outcomes_of(prepare, target.alone, range(first, last)), first):
         counts[outcome] += 1
         if outcome not in ("read", "refused") and counts[outcome] <= 3:
-            found = outcome_of(target.product, alone=False)
+            prepare(number)
+            found = outcome_in_product(target.product)
             if found not in ("read", "refused"):
                 escaped.append(f"{name}: case {number}: {found}")
-        if counts["hang"] == ENOUGH_HANGS:
-            break
     path.write_bytes(contents[name])
     return chunk, [counts[one] for one in OUTCOMES], perf_counter() - begin, escaped
+
+
+def write_case(contents, name, number):
+    """Write a file with the damage of a case."""
+    random = Random(f"{name} {number}")
+    if name.endswith(".message"):
+        content = changed(contents[name], random)
+    else:
+        snippets = SNIPPETS if name.endswith(".yaml") else ()
+        content = damaged(contents[name], random.choice([*contents.values()]), random, snippets)
+    Path(name).write_bytes(content)
 
 
 def enter_own_folder(folder):

@@ -26,6 +26,9 @@ from chipglow.text import Notes, load_described
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 import camera_files
 
+LATE = 20.0
+"""Seconds after which a reader is ended, where the product waits for 600 s."""
+
 RASTER = Raster(0.0, 1.0, 1.0 / 24, 24, 24)
 
 SNIPPETS = (
@@ -43,7 +46,8 @@ MESSAGES = (
     {"n": 3, "kind": "step", "content": ""},
     {"n": 4, "kind": "save", "content": "study.yaml"},
     {"n": 5, "kind": "painted", "content": 1},
-    {"n": 6, "kind": "piece", "content": {"first": 1, "last": 1, "name": "a.yaml", "data": "x"}},
+    {"n": 6, "kind": "theme", "content": "dark"},
+    {"n": 7, "kind": "draw", "content": ""},
 )
 
 
@@ -107,7 +111,7 @@ def target_of(folder, name):
         read = partial(read_recording, path)
         return Target(read, read)
     source = source_of(folder, name)
-    return Target(partial(sample, source), partial(sample, Isolated(source, Sandbox(name))))
+    return Target(partial(sample, source), partial(sample, Isolated(source, Sandbox(name, LATE))))
 
 
 def sample(source):
@@ -131,7 +135,4 @@ def page():
 def send(path):
     """Send a message to the page; text that is no JSON, which no browser sends, is a ValueError."""
     message = json.loads(path.read_bytes())
-    content = message.get("content") if isinstance(message, dict) else None
-    if isinstance(content, dict) and isinstance(content.get("data"), str):
-        content["data"] = content["data"].encode()  # JSON has no bytes, the page's messages have
     page()._receive(SimpleNamespace(data=message))
