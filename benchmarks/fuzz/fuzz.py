@@ -36,6 +36,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from common import arguments, print_head, print_row
 
 PATIENCE, MEMORY, ENOUGH_HANGS, CHUNK = 4, 1024**3, 5, 100
+FAILED = 3
+"""Exit code of a fork that this program made fail, not a case."""
 OUTCOMES = ("read", "refused", "stumbled", "memory", "crash", "hang")
 CHANGES = ("cut", "byte", "word", "number", "repeat", "remove", "splice")
 VALUES = (
@@ -104,25 +106,32 @@ def outcomes_of(prepare, read, numbers):
     """
     found, numbers = [], list(numbers)
     while len(found) < len(numbers) and found.count("hang") < ENOUGH_HANGS:
-        ended, code = _read_in_fork(partial(_read_alone, prepare, read), numbers[len(found) :])
+        outcome = partial(_read_alone, prepare, read)
+        ended, code = _read_in_fork(outcome, numbers[len(found) :], leave_sandbox)
         if ended[-1:] == ["memory"] and len(ended) > 1:
             ended.pop()
         elif code < 0:
             ended.append("hang" if code == -signal.SIGALRM else "crash")
+        elif code == FAILED:
+            raise RuntimeError(f"a fork failed at case {numbers[len(found) + len(ended)]}")
         found += ended
     return found
 
 
 def outcome_in_product(read):
     """Return how reading ends as the product does it, one of `OUTCOMES`."""
-    ended, code = _read_in_fork(lambda number: _outcome(read, 1000), [0])
+    ended, code = _read_in_fork(lambda number: _outcome(read, 1000), [0], lambda: None)
     return ended[0] if ended else "hang" if code == -signal.SIGALRM else "crash"
+
+
+def leave_sandbox():
+    """Read in this process, with the sandbox's limit of memory."""
+    Sandbox.answer = lambda self, function: function()
+    limit_memory(MEMORY)
 
 
 def _read_alone(prepare, read, number):
     prepare(number)
-    Sandbox.answer = lambda self, function: function()
-    limit_memory(MEMORY)
     return _outcome(read, PATIENCE)
 
 
@@ -141,20 +150,21 @@ def _outcome(read, patience):
         signal.alarm(0)
 
 
-def _read_in_fork(outcome, numbers):
+def _read_in_fork(outcome, numbers, begin):
     """Return the outcomes of cases in one fork, and the code with which it ended."""
     receiver, sender = os.pipe()
     child = os.fork()
     if not child:
-        _report_outcomes(outcome, numbers, sender)
+        _report_outcomes(outcome, numbers, begin, sender)
     os.close(sender)
     with os.fdopen(receiver, "rb") as pipe:
         ended = [OUTCOMES[code] for code in pipe.read()]
     return ended, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
-def _report_outcomes(outcome, numbers, sender):
+def _report_outcomes(outcome, numbers, begin, sender):
     try:
+        begin()
         devnull = os.open(os.devnull, os.O_RDWR)
         for number in range(3):
             os.dup2(devnull, number)
@@ -163,8 +173,9 @@ def _report_outcomes(outcome, numbers, sender):
             os.write(sender, bytes([OUTCOMES.index(found)]))
             if found == "memory":
                 break
-    finally:
         os._exit(0)
+    except BaseException:
+        os._exit(FAILED)
 
 
 def fuzz(contents, chunk):
