@@ -226,8 +226,12 @@ class Figures:
         places = {
             name: ColumnDataSource({"x": [], "y": []}, name=name) for name in (*LINES, CURSOR)
         }
+        # Above the images, which a move of the pointer does not paint again, nor tell Python.
         spans = [
-            Span(dimension=one, line_color="#808080", line_width=1) for one in ("height", "width")
+            Span(
+                dimension=one, line_color="#808080", line_width=1, level="overlay", syncable=False
+            )
+            for one in ("height", "width")
         ]
         outline = [] if tool is None else (MICRONS * tool.outline(DRAWN_FACE).T).tolist()
         for one in self.images.values():
@@ -290,5 +294,5 @@ def _draw_over(one: Any, outline: list[list[float]], places: dict[str, ColumnDat
     for colour, width in (("black", 4.0), ("white", 1.8)):
         one.scatter(
             "x", "y", source=places[CURSOR], marker="cross", size=15, line_color=colour,
-            line_width=width,
+            line_width=width, level="overlay",
         )  # fmt: skip

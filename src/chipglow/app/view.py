@@ -112,6 +112,7 @@ class PageView:
         self._handled = 0
         self._began = 0.0
         self._picture: Picture | None = None
+        self._lines: dict[str, dict[str, Array]] = {}
         try:
             if opened.places is not None:
                 self.measuring.restore(opened.places)
@@ -192,6 +193,7 @@ class PageView:
 
     def _on_ready(self, _: None) -> None:
         """Fill a page that has just been rendered, and compute its picture."""
+        self._lines = {}
         self._put_values()
         text = self._refused or "Computing the first picture."
         self._say(text, "error" if self._refused else "busy")
@@ -275,12 +277,23 @@ class PageView:
             self.opened.show(picture, model.frames(state), model.frame(state), measured)
         self._say(*self._described(picture))
         # The page draws the curves after the images: that halves the time to the images.
-        lines = {f"{name}_values": _columns(curves) for name, curves in picture.lines.items()}
-        content = {"number": number, "lines": lines, "absent": picture.absent}
+        content = {"number": number, "lines": self._changed_lines(picture)}
+        content["absent"] = picture.absent
         content["images"] = list(picture.panels)
         self._send("picture", content | {"quick": picture.quick})
         if numbers is not None:
             self._show_numbers(picture, numbers, {})
+
+    def _changed_lines(self, picture: Picture) -> dict[str, dict[str, Array]]:
+        """Return the curves that the page does not have: the cursor changes none of them."""
+        lines = {f"{name}_values": _columns(curves) for name, curves in picture.lines.items()}
+        changed = {
+            name: curves
+            for name, curves in lines.items()
+            if not _are_equal(curves, self._lines.get(name, {}))
+        }
+        self._lines = lines
+        return changed
 
     def _described(self, picture: Picture) -> tuple[str, str]:
         """Return the status of the page with a picture, and its kind."""
@@ -427,6 +440,12 @@ def _columns(curves: Mapping[str, Array]) -> dict[str, Array]:
     unknown = np.full_like(curves["along"], np.nan)
     drawn = {"corrected": unknown, **curves}
     return {key: np.asarray(curve) for key, curve in drawn.items() if key not in ("low", "high")}
+
+
+def _are_equal(curves: Mapping[str, Array], others: Mapping[str, Array]) -> bool:
+    return curves.keys() == others.keys() and all(
+        np.array_equal(curve, others[key], equal_nan=True) for key, curve in curves.items()
+    )
 
 
 def _largest(contributions: Mapping[str, float]) -> dict[str, float]:
