@@ -493,8 +493,8 @@ class Measuring:
 
 
 def _mapper(one: Any) -> LinearColorMapper:
-    """Return the colours of the image of a figure."""
-    return one.select_one(LinearColorMapper)
+    """Return the colours of the image of a figure, which is the first that it draws."""
+    return one.renderers[0].glyph.color_mapper  # a search of the figure's models takes long
 
 
 def _number(name: str, value: float | None = None) -> Any:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from secrets import token_urlsafe
 from shutil import rmtree
@@ -253,6 +254,7 @@ class OpenFiles:
 
     def warm(self) -> None:
         """Prepare to open a file, so that the first one takes no longer than others."""
+        import_module("pandas.io.formats.style")  # of the table; it imports Matplotlib
         with self.process.used():
             Sandbox("reader").answer(load_libraries)
         band = Study().camera.build().band

@@ -118,13 +118,14 @@ class PageView:
                 self.measuring.restore(opened.places)
         except ValueError as error:
             self._refused = f"Session: {error}"
+        self._panels = pn.Column(sizing_mode="stretch_width", margin=0)
         self.page = Page(
             html=_html(opened, self.figures, files is not None, embedded),
             figures=[
                 pn.pane.Bokeh(one, sizing_mode="fixed", margin=0)
                 for one in self.figures.all.values()
             ],
-            panels=[self.measuring.panel],
+            panels=[self._panels],
             tools=self.measuring.tools,
             dropper=self._dropper() if files is not None else None,
             sizing_mode="stretch_width",
@@ -168,9 +169,15 @@ class PageView:
             "cancel": self._on_cancel,
             "chip": self._on_chip,
             "save": self._on_save,
-            "painted": self.session.painted,
+            "painted": self._on_painted,
             "theme": self._on_theme,
         }
+
+    def _on_painted(self, number: int) -> None:
+        """Note that a picture is shown; after the first one the page gets what stands below."""
+        self.session.painted(number)
+        if not len(self._panels):
+            self._panels.append(self.measuring.panel)
 
     def _on_theme(self, theme: str) -> None:
         self.figures.set_theme(theme)
