@@ -1,6 +1,7 @@
 """The page that asks for the settings of a file: it has the fields of the description."""
 
 from collections.abc import Callable, Mapping
+from html import escape
 from typing import Any, Final
 
 import panel as pn
@@ -41,16 +42,18 @@ class AskingPage:
         self._fields: dict[Content, dict[str, pn.widgets.TextInput]] = {}
         options = {CONTENTS[one]: one for one in asking.contents}
         self._content = pn.widgets.Select(
-            name="Content of the file", options=options, width=_WIDTH, visible=len(options) > 1
+            label="Content of the file", options=options, width=_WIDTH, visible=len(options) > 1
         )
-        self._said = pn.pane.Markdown("", stylesheets=[_ERROR_STYLE], sizing_mode="stretch_width")
-        self._button = pn.widgets.Button(name="Open", button_type="primary", width=_WIDTH)
+        # HTML, not Markdown, which makes links of names such as spot.nc and slants a_b_c.
+        self._said = pn.pane.HTML("", stylesheets=[_ERROR_STYLE], sizing_mode="stretch_width")
+        self._button = pn.widgets.Button(label="Open", color="primary", width=_WIDTH)
         self._button.on_click(self._clicked)
         self._content.param.watch(lambda _: self._choose(), "value")
         self._asked = pn.Column(sizing_mode="stretch_width")
-        title = f"## {asking.name}\n\n{_INTRODUCTION.format(asking.name)}"
+        name = escape(asking.name)
+        title = f"<h2>{name}</h2><p>{_INTRODUCTION.format(name)}</p>"
         form = pn.Column(
-            pn.pane.Markdown(title, stylesheets=[_STYLE], sizing_mode="stretch_width"),
+            pn.pane.HTML(title, stylesheets=[_STYLE], sizing_mode="stretch_width"),
             self._content,
             self._said,
             self._asked,
@@ -108,14 +111,14 @@ class AskingPage:
             self._document.add_next_tick_callback(show)
 
     def _say(self, error: str) -> None:
-        lines = [f"- {part}" for part in readable(error).split("; ")] if error else []
-        self._said.object = "\n".join(lines)
-        self._said.visible = bool(lines)
+        parts = readable(error).split("; ")
+        self._said.object = f"<ul>{''.join(f'<li>{escape(part)}</li>' for part in parts)}</ul>"
+        self._said.visible = bool(error)
 
 
 def _field(setting: Setting, text: str) -> pn.widgets.TextInput:
     return pn.widgets.TextInput(
-        name=setting.path,
+        label=setting.path,
         value=text,
         placeholder=setting.allowed.removeprefix("none, ").removeprefix("or "),
         description=setting.parameter.meaning,

@@ -63,6 +63,14 @@ SHOWN: Final = ("start", "images", "scene_image", "error_image", "emissivity_unc
 
 SHOWN_LINE: Final = "# Shown in chipglow app: "
 
+_OTHER_OUTPUT: Final = {
+    ("emissivity", "region_mean"): "an emissivity map, not an image: open the measurement, and "
+    "give its places their emissivity in the table, or use chipglow correct --emissivity",
+    ("kernel", "edge1_esf"): "a point spread function, not an image: open the "
+    "measurement, and name this file under PSF",
+}
+"""What files of other commands are, by the variables that only they have."""
+
 _Points: TypeAlias = Iterable[Any]
 """Pairs of x and y in m."""
 
@@ -215,6 +223,9 @@ def _opened(path: Path, study: Study | None) -> Model | Asking:
         return correction_model(read_correction(path), path.name)
     if is_measurement(path):
         return measurement_model(StoredFrames(open_measurement(path)), path.name)
+    for names, use in _OTHER_OUTPUT.items():
+        if holds(path, names):
+            raise ValueError(f"{path}: is {use}")
     contents = () if is_scene(path) else contents_of(path)
     if contents and not holds(path, ()):
         return Asking(path, path.name, contents)
