@@ -7,7 +7,11 @@ from the key's event to the frame of the screen after the new image was there, b
 clock: the first picture, which may be a quick look, the curves along its lines, and the exact
 picture where the hand rests. Then how long the command took to the first exact picture, and the
 memory of the server. With --frames, also how long a PTW file of so many frames of 640 x 512 pixels
-takes from its settings to its image, and a click on the image to the numbers at the cursor.
+takes from its settings to its image, and a click on the image to the numbers at the cursor; the
+same of empty_page.py, which is the least on this machine, and their ratio. Of each: all by the
+clock, the processor time of the server and of the processes that it started, the time in which the
+browser's main thread was busy, from the first message of the browser to the last one of the server
+before the end (for a click: server and transfer), and how many and how large the server's were.
 """
 
 import os
@@ -71,8 +75,9 @@ NUMBERS = """() => {
     asked = 0;
     const shown = () => clicked.push(performance.now() - since);
     if (since) requestAnimationFrame(() => setTimeout(shown, 0));
-  }).observe(numbers, { childList: true });
+  }).observe(numbers.shadowRoot ?? numbers, { childList: true, subtree: true });
 }"""
+COLUMNS = ("all", "server", "browser", "answer", "messages", "kB")
 
 
 def main():
@@ -99,37 +104,120 @@ def main():
 
 
 def report_recording(browser, folder, given):
-    """Open a recording by its settings, and click on its image."""
+    """Open a recording by its settings, and click on its image; the same of an empty page."""
     row, column = np.mgrid[:512, :640]
     spot = 3000 + 9000 * np.exp(-((column - 320) ** 2 + (row - 256) ** 2) / 2 / 60**2)
     images = (spot + 4 * number for number in range(given.frames))
     recording = folder / "run.ptw"
     recording.write_bytes(ptw(np.stack([image.astype(np.uint16) for image in images])))
     (folder / "calibration.yaml").write_text(CALIBRATION)
-    command = [sys.executable, "-m", "chipglow", "app", "--no-browser", str(recording)]
+
+    def fill(page):
+        page.get_by_label("pitch", exact=True).fill("15 um")
+        page.get_by_label("calibration", exact=True).fill(str(folder / "calibration.yaml"))
+
+    app = [sys.executable, "-m", "chipglow", "app", "--no-browser", str(recording)]
+    empty = [sys.executable, str(Path(__file__).with_name("empty_page.py"))]
+    opened, cursor = opened_and_clicked(browser, app, "#figure-measured", given.turns, fill)
+    floors = opened_and_clicked(browser, empty, ".picture", given.turns)
+    print(f"{'':34}{''.join(f'{head:>10}' for head in COLUMNS)}   ms, but the last two")
+    what = f"recording of {given.frames} frames", "cursor, median", "cursor, 95 %"
+    apps = opened, *np.percentile(cursor, (50, 95), axis=0)
+    floors = floors[0], *np.percentile(floors[1], (50, 95), axis=0)
+    for name, times, floor in zip(what, apps, floors, strict=True):
+        for label, values in ((name, times), ("  empty page", floor)):
+            print(f"{label:34}{''.join(f'{one:10.0f}' for one in values)}")
+        ratios = np.divide(times, floor, out=np.full(len(floor), np.nan), where=np.array(floor) > 0)
+        print(f"{'  ratio':34}{''.join(f'{one:10.1f}' for one in ratios)}")
+    print(f"load {os.getloadavg()[0]:.1f}")
+
+
+def opened_and_clicked(browser, command, image, turns, prepare=lambda page: None):
+    """Columns of a press on Open until the image is there, and of each click on the image."""
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         try:
             page = browser.new_page(viewport={"width": 1400, "height": 900})
             page.goto(server.stdout.readline().split()[-1])
-            page.get_by_label("pitch", exact=True).fill("15 um")
-            page.get_by_label("calibration", exact=True).fill(str(folder / "calibration.yaml"))
-            page.wait_for_timeout(5000)  # of a user: the app prepares itself meanwhile
-            begun = time.perf_counter()
-            page.get_by_role("button", name="Open").click()
-            page.get_by_text("Measured image").wait_for(timeout=300_000)
-            opened = time.perf_counter() - begun
+            prepare(page)
+            page.wait_for_timeout(10_000)  # of a user: the app prepares itself meanwhile
+            watch = Watch(page, server.pid)
+
+            def press():
+                page.get_by_role("button", name="Open").click()
+                page.get_by_text("Measured image").wait_for(timeout=300_000)
+
+            opened = watch.columns(press)
+            page.wait_for_timeout(3000)
             page.evaluate(NUMBERS)
-            box = page.locator("#figure-measured").bounding_box()
-            for number in range(given.turns):
-                page.mouse.click(box["x"] + 120 + 3 * number, box["y"] + 90 + 2 * number)
-                page.wait_for_function(f"() => clicked.length > {number}", polling="raf")
+            box = page.locator(image).bounding_box()
+            clicked = []
+            for number in range(turns):
+
+                def click(number=number):
+                    page.mouse.click(box["x"] + 120 + 3 * number, box["y"] + 90 + 2 * number)
+                    page.wait_for_function(f"() => clicked.length > {number}", polling="raf")
+
+                clicked.append(watch.columns(click))
                 page.wait_for_timeout(400)  # a quicker second one would zoom
-            times = page.evaluate("() => clicked")
+            for columns, shown in zip(clicked, page.evaluate("() => clicked"), strict=True):
+                columns[0] = shown
+            page.close()
         finally:
             server.terminate()
-    middle, late = np.percentile(times, (50, 95))
-    print(f"recording of {given.frames} frames: {opened:.1f} s; load {os.getloadavg()[0]:.1f}")
-    print(f"numbers at the cursor: median {middle:.0f} ms, 95 % within {late:.0f} ms")
+    return opened, clicked
+
+
+class Watch:
+    """What a server, its messages and the browser's main thread do meanwhile."""
+
+    def __init__(self, page, process):
+        self._page, self._process = page, process
+        self._cdp = page.context.new_cdp_session(page)
+        self._cdp.send("Performance.enable")
+        self._cdp.send("Network.enable")
+        self._cdp.on("Network.webSocketFrameSent", self._sent)
+        self._cdp.on("Network.webSocketFrameReceived", self._received)
+        self._out, self._in, self._bytes = [], [], []
+
+    def _sent(self, event):
+        self._out.append(event["timestamp"])
+
+    def _received(self, event):
+        frame = event["response"]
+        is_text = frame["opcode"] == 1  # others are in Base64
+        self._in.append(event["timestamp"])
+        self._bytes.append(len(frame["payloadData"]) * (1 if is_text else 0.75))
+
+    def columns(self, act):
+        """Values of `COLUMNS`."""
+        self._out, self._in, self._bytes = [], [], []
+        begun, worked, busy = time.perf_counter(), worked_by(self._process), self._busy()
+        act()
+        taken, busy = time.perf_counter() - begun, self._busy() - busy
+        worked = worked_by(self._process) - worked
+        answer = self._in[-1] - self._out[0]
+        spans = [1e3 * one for one in (taken, worked, busy, answer)]
+        return [*spans, len(self._in), sum(self._bytes) / 1e3]
+
+    def _busy(self):
+        """Seconds in which the main thread of the page was busy."""
+        metrics = self._cdp.send("Performance.getMetrics")["metrics"]
+        return next(one["value"] for one in metrics if one["name"] == "TaskDuration")
+
+
+def worked_by(process):
+    """Seconds of the processor of a process and of those that it started."""
+    fields = {}
+    for file in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            number, rest = file.parent.name, file.read_text().rpartition(")")[2].split()
+        except OSError:  # it ended meanwhile
+            continue
+        fields[int(number)] = int(rest[1]), sum(map(int, rest[11:15]))  # with ended children
+    found = {process}
+    while more := {one for one, (parent, _) in fields.items() if parent in found} - found:
+        found |= more
+    return sum(fields[one][1] for one in found) / os.sysconf("SC_CLK_TCK")
 
 
 def measured(browser, url, given):

@@ -1,6 +1,7 @@
 """Files of cameras and other programs in the app: their settings, correction, and two cameras."""
 
 import os
+from dataclasses import replace
 from types import SimpleNamespace
 
 import camera_files
@@ -12,6 +13,7 @@ import xarray as xr
 from command import run
 from hot_frames import hot_frames
 from scipy.ndimage import binary_dilation
+from synthetic_edge import edge_radiance, gaussian_edge, image_of
 
 from chipglow.app.asking import contents_of, settings_of
 from chipglow.app.controls import CORRECTION_IMAGES
@@ -26,12 +28,15 @@ from chipglow.io.cameras.ptw import Ptw
 from chipglow.io.cameras.stacks import Stated
 from chipglow.laboratory.emissivity import EmissivityLine
 from chipglow.laboratory.emissivity.places import KnownEmissivity
+from chipglow.laboratory.psf import knife_edge, write_psf
 from chipglow.laboratory.recordings import CameraFrames, load_description, load_measurement
 from chipglow.quantities import ZERO_CELSIUS
 
 pytest.importorskip("panel", reason="needs the extra app")
+import panel as pn
 from app_page import shown
 
+from chipglow.app.asking_page import AskingPage
 from chipglow.app.view import PageView
 
 BOX = ((240e-6, 190e-6), (280e-6, 230e-6))
@@ -206,6 +211,49 @@ def test_a_dropped_file_is_asked_for_and_removed_at_the_end(ptw, files):
         files.add("holiday.nc", b"no scene" * 100)
     files.close()
     assert not files.folder.exists()
+
+
+def test_what_another_command_wrote_is_named_and_not_asked_for(ptw, tmp_path):
+    path, settings = ptw
+    (tmp_path / "places.yaml").write_text("regions: {body: {rectangle: [[20, 10], [40, 30]]}}\n")
+    stated = [word for name, text in settings.items() for word in ("--set", f"{name}={text}")]
+    known = ["--regions", tmp_path / "places.yaml", "--reference", "900 degC"]
+    run("emissivity", path, *stated, *known, "--out", tmp_path / "emissivity.nc")
+    edge = image_of(edge_radiance(gaussian_edge(10e-6), 5.0, 40), 0.05, 0, None, "edge")
+    write_psf(knife_edge([edge]), tmp_path / "psf.nc")
+    for name, content in (("emissivity", "emissivity map"), ("psf", "point spread function")):
+        with pytest.raises(ValueError, match=rf"{name}\.nc: is an? {content}, not an image"):
+            open_any(tmp_path / f"{name}.nc")
+
+
+def test_the_name_of_a_file_is_no_link(tiff, files):
+    path, _ = tiff
+    named = path.rename(path.with_name("a_b_c.nc"))
+    asking = replace(open_any(named), contents=("measurement",), error="a_b_c.nc: <missing>")
+    page = AskingPage(asking, "", files, lambda model: None)
+    texts = "".join(one.object for one in page.page.select(pn.pane.HTML))
+    assert "a_b_c.nc" in texts and "&lt;missing&gt;" in texts
+    assert not list(page.page.select(pn.pane.Markdown))
+
+
+def test_settings_are_followed_by_the_page_of_the_file_in_place(tiff, files):
+    path, settings = tiff
+    files.close()
+    files = OpenFiles(open_any(path))
+    shown = []
+
+    def view(model):
+        shown.append(model)
+        return pn.pane.HTML()
+
+    page = AskingPage(files.find(""), "", files, view)
+    page.start(SimpleNamespace(add_next_tick_callback=lambda act: act()))
+    page._open(("measurement", {"unit": "K"}))
+    assert not shown and "interval" in "".join(one.object for one in page.page.select(pn.pane.HTML))
+    page._open(("measurement", settings))
+    assert [one.raster.shape for one in shown] == [(40, 60)]
+    assert len(page.page) == 1 and isinstance(page.page[0], pn.pane.HTML)
+    files.close()
 
 
 # Correction of a measurement

@@ -1,12 +1,14 @@
 """The page that asks for the settings of a file: it has the fields of the description."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from html import escape
 from typing import Any, Final
 
 import panel as pn
 from bokeh.document import Document
 
 from chipglow.app.asking import CONTENTS, FIRST, Content, Setting, settings_of
+from chipglow.app.models import Model
 from chipglow.app.opening import Asking, OpenFiles
 from chipglow.app.session import Newest
 from chipglow.quantities.format import readable
@@ -26,36 +28,40 @@ _ERROR_STYLE: Final = f"{_STYLE} :host {{ color: #b3261e; }}"
 
 
 class AskingPage:
-    """The page of a file that lacks settings; afterwards the browser opens the file's own page."""
+    """The page of a file that lacks settings; then it shows what `view` returns of the open file.
 
-    def __init__(self, asking: Asking, key: str, files: OpenFiles) -> None:
-        self._key, self._files = key, files
+    The browser has the scripts by then: another page would load them again.
+    """
+
+    def __init__(
+        self, asking: Asking, key: str, files: OpenFiles, view: Callable[[Model], Any]
+    ) -> None:
+        self._key, self._files, self._view = key, files, view
         self._document: Document | None = None
         self._work = Newest(self._open, self._notified)
         self._fields: dict[Content, dict[str, pn.widgets.TextInput]] = {}
         options = {CONTENTS[one]: one for one in asking.contents}
         self._content = pn.widgets.Select(
-            name="Content of the file", options=options, width=_WIDTH, visible=len(options) > 1
+            label="Content of the file", options=options, width=_WIDTH, visible=len(options) > 1
         )
-        self._said = pn.pane.Markdown("", stylesheets=[_ERROR_STYLE], sizing_mode="stretch_width")
-        self._button = pn.widgets.Button(name="Open", button_type="primary", width=_WIDTH)
+        # HTML, not Markdown, which makes links of names such as spot.nc and slants a_b_c.
+        self._said = pn.pane.HTML("", stylesheets=[_ERROR_STYLE], sizing_mode="stretch_width")
+        self._button = pn.widgets.Button(label="Open", color="primary", width=_WIDTH)
         self._button.on_click(self._clicked)
         self._content.param.watch(lambda _: self._choose(), "value")
-        # The browser loads the file's page when this text changes.
-        self._done = pn.widgets.TextInput(visible=False)
-        self._done.jscallback(value="window.location.search = cb_obj.value")
         self._asked = pn.Column(sizing_mode="stretch_width")
-        title = f"## {asking.name}\n\n{_INTRODUCTION.format(asking.name)}"
-        self.page = pn.Column(
-            pn.pane.Markdown(title, stylesheets=[_STYLE], sizing_mode="stretch_width"),
+        name = escape(asking.name)
+        title = f"<h2>{name}</h2><p>{_INTRODUCTION.format(name)}</p>"
+        form = pn.Column(
+            pn.pane.HTML(title, stylesheets=[_STYLE], sizing_mode="stretch_width"),
             self._content,
             self._said,
             self._asked,
             self._button,
-            self._done,
             sizing_mode="stretch_width",
             styles={"max-width": "1100px", "margin": "0 auto", "padding": "8px"},
         )
+        self.page = pn.Column(form, sizing_mode="stretch_width", margin=0)
         self._choose(asking.settings)
         self._say(asking.error)
 
@@ -85,29 +91,34 @@ class AskingPage:
 
     def _open(self, answer: tuple[Content, dict[str, str]]) -> None:
         opened = self._files.answer(self._key, *answer)
-        error = opened.error if isinstance(opened, Asking) else ""
-        self._notified("failed" if error else "opened", error)
+        if isinstance(opened, Asking):
+            self._notified("failed", opened.error)
+        else:
+            self._later(lambda: self._show(opened))
 
-    def _notified(self, kind: str, text: str) -> None:
+    def _show(self, opened: Model) -> None:
+        self.page[:] = [self._view(opened)]
+
+    def _notified(self, _kind: str, text: str) -> None:
         def show() -> None:
             self._button.loading = False
-            if kind == "failed":
-                self._say(text)
-            else:
-                self._done.value = f"?open={self._key}" if self._key else "?"
+            self._say(text)
 
+        self._later(show)
+
+    def _later(self, show: Callable[[], None]) -> None:
         if self._document is not None:
             self._document.add_next_tick_callback(show)
 
     def _say(self, error: str) -> None:
-        lines = [f"- {part}" for part in readable(error).split("; ")] if error else []
-        self._said.object = "\n".join(lines)
-        self._said.visible = bool(lines)
+        parts = readable(error).split("; ")
+        self._said.object = f"<ul>{''.join(f'<li>{escape(part)}</li>' for part in parts)}</ul>"
+        self._said.visible = bool(error)
 
 
 def _field(setting: Setting, text: str) -> pn.widgets.TextInput:
     return pn.widgets.TextInput(
-        name=setting.path,
+        label=setting.path,
         value=text,
         placeholder=setting.allowed.removeprefix("none, ").removeprefix("or "),
         description=setting.parameter.meaning,

@@ -15,6 +15,7 @@ from bokeh.models import (
     Range1d,
     Span,
     WheelZoomTool,
+    glyphs,
 )
 from bokeh.palettes import Cividis256, Inferno256, RdBu11, interp_palette
 from bokeh.plotting import figure
@@ -61,6 +62,8 @@ _PADDING: Final = 4
 
 _LINE_HEIGHT: Final = 150
 """Initial height in pixels of a figure of the temperatures along a line."""
+
+_NOTHING: Final = np.full((1, 1), np.nan)
 
 _SIDE: Final = 180
 """Initial size of a frame in pixels; page.js fits the figures to the page."""
@@ -113,8 +116,10 @@ class Image:
             return
         self._shown = panel.values
         left, right, bottom, top = (MICRONS * edge for edge in panel.raster.extent)
+        # Of an image without values, such as one that is not yet corrected, one pixel is enough.
+        values = panel.values if np.isfinite(panel.values).any() else _NOTHING
         self.source.data = {
-            "image": [np.ascontiguousarray(panel.values[::-1], np.float32)],
+            "image": [np.ascontiguousarray(values[::-1], np.float32)],
             "x": [left],
             "y": [bottom],
             "dw": [right - left],
@@ -226,8 +231,10 @@ class Figures:
         places = {
             name: ColumnDataSource({"x": [], "y": []}, name=name) for name in (*LINES, CURSOR)
         }
+        # Above the images, which a move of the pointer does not paint again, nor tell Python.
         spans = [
-            Span(dimension=one, line_color="#808080", line_width=1) for one in ("height", "width")
+            Span(dimension=one, line_color="#808080", line_width=1, level="overlay", syncable=False)
+            for one in ("height", "width")
         ]
         outline = [] if tool is None else (MICRONS * tool.outline(DRAWN_FACE).T).tolist()
         for one in self.images.values():
@@ -277,18 +284,21 @@ def _figure(name: str, title: str, height: int, **given: Any) -> Any:
 
 
 def _draw_over(one: Any, outline: list[list[float]], places: dict[str, ColumnDataSource]) -> None:
-    """Draw tool, lines and cursor in two widths (pixels) and colours, to be seen on any ground."""
-    for colour, width in (("white", 2.4), ("black", 1.2)) if outline else ():
-        one.line(*outline, line_color=colour, line_width=width)
+    """Draw tool, lines and cursor in two widths (pixels) and colours, to be seen on any ground.
+
+    As glyphs, each of which is one model; the methods of a figure make three.
+    """
+    if outline:
+        source = ColumnDataSource(dict(zip("xy", outline, strict=True)))
+        for colour, width in (("white", 2.4), ("black", 1.2)):
+            one.add_glyph(source, glyphs.Line(line_color=colour, line_width=width))
     for name in LINES:
         for colour, width in (("black", 3.4), (LINE_COLOURS[name], 1.8)):
-            one.line("x", "y", source=places[name], line_color=colour, line_width=width)
-        one.scatter(
-            "x", "y", source=places[name], size=9, marker="circle", line_color="black",
-            fill_color=LINE_COLOURS[name], line_width=1.2,
-        )  # fmt: skip
+            one.add_glyph(places[name], glyphs.Line(line_color=colour, line_width=width))
+        ends = glyphs.Scatter(
+            size=9, line_color="black", fill_color=LINE_COLOURS[name], line_width=1.2
+        )
+        one.add_glyph(places[name], ends)
     for colour, width in (("black", 4.0), ("white", 1.8)):
-        one.scatter(
-            "x", "y", source=places[CURSOR], marker="cross", size=15, line_color=colour,
-            line_width=width,
-        )  # fmt: skip
+        cross = glyphs.Scatter(marker="cross", size=15, line_color=colour, line_width=width)
+        one.add_glyph(places[CURSOR], cross, level="overlay")

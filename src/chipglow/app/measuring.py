@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from html import escape
 from importlib.util import find_spec
 from io import BytesIO
 from math import isfinite, nan
@@ -252,7 +253,7 @@ class Measuring:
         self._rows.visible = bool(self._marks)
         self._copied.data = {"text": [self._table.to_csv(sep="\t", index=False)]}
         warnings = [warning for one in readings for warning in one.notes.warnings]
-        self._warnings.object = "\n\n".join(warnings)
+        self._warnings.object = "".join(f"<p>{escape(one)}</p>" for one in warnings)
         self._warnings.visible = bool(warnings)
 
     def _show_lines(self) -> None:
@@ -427,7 +428,7 @@ class Measuring:
         self._rows.on_click(lambda event: self._remove(event.row), column="delete")
         self._rows.param.watch(lambda _: self._later(self._show_histogram), "selection")
         self._hint = pn.pane.HTML(_HINTS["look"], margin=2)
-        self._warnings = pn.pane.Markdown("", visible=False)
+        self._warnings = pn.pane.HTML("", visible=False)
         self._low = _number("Colours from / °C")
         self._high = _number("to / °C")
         self._isotherm = _number("Isotherm / °C")
@@ -493,8 +494,8 @@ class Measuring:
 
 
 def _mapper(one: Any) -> LinearColorMapper:
-    """Return the colours of the image of a figure."""
-    return one.select_one(LinearColorMapper)
+    """Return the colours of the image of a figure, which is the first that it draws."""
+    return one.renderers[0].glyph.color_mapper  # a search of the figure's models takes long
 
 
 def _number(name: str, value: float | None = None) -> Any:

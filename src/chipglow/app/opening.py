@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from secrets import token_urlsafe
 from shutil import rmtree
@@ -61,6 +62,14 @@ SHOWN: Final = ("start", "images", "scene_image", "error_image", "emissivity_unc
 """Settings of the page that a study does not have."""
 
 SHOWN_LINE: Final = "# Shown in chipglow app: "
+
+_OTHER_OUTPUT: Final = {
+    ("emissivity", "region_mean"): "an emissivity map, not an image: open the measurement, and "
+    "give its places their emissivity in the table, or use chipglow correct --emissivity",
+    ("kernel", "edge1_esf"): "a point spread function, not an image: open the "
+    "measurement, and name this file under PSF",
+}
+"""What files of other commands are, by the variables that only they have."""
 
 _Points: TypeAlias = Iterable[Any]
 """Pairs of x and y in m."""
@@ -214,6 +223,9 @@ def _opened(path: Path, study: Study | None) -> Model | Asking:
         return correction_model(read_correction(path), path.name)
     if is_measurement(path):
         return measurement_model(StoredFrames(open_measurement(path)), path.name)
+    for names, use in _OTHER_OUTPUT.items():
+        if holds(path, names):
+            raise ValueError(f"{path}: is {use}")
     contents = () if is_scene(path) else contents_of(path)
     if contents and not holds(path, ()):
         return Asking(path, path.name, contents)
@@ -253,6 +265,7 @@ class OpenFiles:
 
     def warm(self) -> None:
         """Prepare to open a file, so that the first one takes no longer than others."""
+        import_module("pandas.io.formats.style")  # of the table; it imports Matplotlib
         with self.process.used():
             Sandbox("reader").answer(load_libraries)
         band = Study().camera.build().band

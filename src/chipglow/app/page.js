@@ -49,6 +49,8 @@ export function render({ view, model, el }) {
     });
   }
 
+  const afterPaint = (act) => requestAnimationFrame(() => setTimeout(act, 0));
+
   each("[data-send]", "click", ({ dataset }) => send(dataset.send, dataset.content ?? ""));
 
   // Controls: those of the column, and the positions of the cursor and of the ends of the lines.
@@ -57,7 +59,7 @@ export function render({ view, model, el }) {
   for (const box of page.querySelectorAll("[data-path]")) {
     const path = box.dataset.path, stops = spec.stops[path] ?? [];
     const field = box.querySelector("select, input[type=text]"), slider = box.querySelector("input[type=range]");
-    const entry = { box, field, slider, stops, sent: 0, text: "", typing: false };
+    const entry = { box, field, slider, stops, sent: 0, text: "", drawn: "", typing: false };
     controls.set(path, entry);
     // A text that is being typed stays, whatever comes from Python meanwhile.
     field.addEventListener("input", () => { entry.typing = field.type === "text"; });
@@ -102,6 +104,9 @@ export function render({ view, model, el }) {
 
   const points = (name) => controls.get(name).text.split(";").map((one) => one.split(",").map(Number));
   function setPlaces(name, places) {
+    const entry = controls.get(name), now = String(places);
+    if (entry.drawn === now) return; // each change paints all images again
+    entry.drawn = now;
     const [x, y] = [0, 1].map((axis) => places.map((one) => one[axis]));
     named(name)?.setv({ data: { x, y } }, { sync: false });
   }
@@ -205,7 +210,7 @@ export function render({ view, model, el }) {
     find("#redo").disabled = !can_redo;
     if (!spec.embedded) {
       const query = new URLSearchParams(link).toString();
-      history.replaceState(null, "", query ? `?${query}` : location.pathname);
+      afterPaint(() => history.replaceState(null, "", query ? `?${query}` : location.pathname));
     }
   }
 
@@ -283,12 +288,12 @@ export function render({ view, model, el }) {
       option.label = option.text + (reason ? `: 0, ${reason}` : "");
       option.disabled = Boolean(reason);
     }
-    requestAnimationFrame(() => setTimeout(() => {
+    afterPaint(() => {
       send("painted", number);
       for (const [name, data] of Object.entries(lines)) named(name).setv({ data }, { sync: false });
       const left = 80 - (performance.now() - stepped);
       if (playing) setTimeout(() => playing && step(1), Math.max(left, 0));
-    }, 0));
+    });
   }
 
   // The images of a mode; the others are hidden.

@@ -4,6 +4,7 @@ import secrets
 import signal
 import socket
 from contextlib import suppress
+from functools import partial
 from threading import Thread
 from typing import Any, Final
 
@@ -12,6 +13,7 @@ from bokeh.server.auth_provider import AuthProvider
 from tornado.web import RequestHandler
 
 from chipglow.app.asking_page import AskingPage
+from chipglow.app.controls import Texts
 from chipglow.app.models import Model
 from chipglow.app.opening import Asking, OpenFiles
 from chipglow.app.view import PageView
@@ -54,6 +56,8 @@ class App:
 
     def __init__(self, first: Model | Asking, address: str = LOCAL, port: int = 0) -> None:
         port = _free_port(address, port)
+        # A page that asks for settings loads the scripts that the file's own page needs then.
+        pn.extension("tabulator", "filedropper")
         self.files = OpenFiles(first)
         auth = TokenAuth()
         everywhere = address == "0.0.0.0"
@@ -99,13 +103,19 @@ class App:
         opened = self.files.find(key)
         if opened is None:
             return pn.pane.HTML("<p>This file is no longer open: open it again.</p>")
+        document = pn.state.curdoc
+        view = partial(self._view, given=given, key=key, document=document)
         if isinstance(opened, Asking):
-            asking = AskingPage(opened, key, self.files)
-            asking.start(pn.state.curdoc)
+            asking = AskingPage(opened, key, self.files, view)
+            asking.start(document)
             return asking.page
+        return view(opened)
+
+    def _view(self, opened: Model, given: Texts, key: str, document: Any) -> Any:
+        """Return the page of an open file."""
         view = PageView(opened, given, {OPEN: key} if key else {}, self.files)
-        view.start(pn.state.curdoc)
-        pn.state.on_session_destroyed(lambda _: view.end())
+        view.start(document)
+        document.on_session_destroyed(lambda _: view.end())
         return view.page
 
 

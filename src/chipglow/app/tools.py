@@ -14,6 +14,7 @@ from bokeh.models import (
     PointDrawTool,
     PolySelectTool,
     RadioButtonGroup,
+    glyphs,
 )
 
 from chipglow.app.figures import MICRONS
@@ -106,10 +107,10 @@ class DrawnPlaces:
     def _draw_on(self, one: Any) -> list[Any]:
         """Draw the places on a figure, and return its tools in the order of the choices."""
         for colour, width in (("black", 3.4), ("colour", 1.8)):
-            one.multi_line("xs", "ys", source=self._outlines, line_color=colour, line_width=width)
-        one.multi_line(
-            "xs", "ys", source=self.isotherm, line_color="white", line_width=1.6, line_dash="4 2"
-        )
+            outlines = glyphs.MultiLine(line_color=colour, line_width=width)
+            one.add_glyph(self._outlines, outlines)
+        dashed = glyphs.MultiLine(line_color="white", line_width=1.6, line_dash="4 2")
+        one.add_glyph(self.isotherm, dashed)
         one.add_layout(
             LabelSet(
                 x="x", y="y", text="name", source=self._labels, x_offset=4, y_offset=4,
@@ -117,11 +118,10 @@ class DrawnPlaces:
                 background_fill_alpha=0.6,
             )
         )  # fmt: skip
-        handles = one.scatter(
-            "x", "y", source=self._handles, size=9, fill_color="colour", line_color="black"
-        )
-        points = one.scatter("x", "y", source=self._points, size=9)
-        strokes = one.multi_line("xs", "ys", source=self._strokes, line_color="white")
+        handle = glyphs.Scatter(size=9, fill_color="colour", line_color="black")
+        handles = one.add_glyph(self._handles, handle)
+        points = one.add_glyph(self._points, glyphs.Scatter(size=9))
+        strokes = one.add_glyph(self._strokes, glyphs.MultiLine(line_color="white"))
         return [
             PointDrawTool(renderers=[points], drag=False),
             FreehandDrawTool(renderers=[strokes]),

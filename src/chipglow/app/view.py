@@ -112,18 +112,20 @@ class PageView:
         self._handled = 0
         self._began = 0.0
         self._picture: Picture | None = None
+        self._lines: dict[str, dict[str, Array]] = {}
         try:
             if opened.places is not None:
                 self.measuring.restore(opened.places)
         except ValueError as error:
             self._refused = f"Session: {error}"
+        self._panels = pn.Column(sizing_mode="stretch_width", margin=0)
         self.page = Page(
             html=_html(opened, self.figures, files is not None, embedded),
             figures=[
                 pn.pane.Bokeh(one, sizing_mode="fixed", margin=0)
                 for one in self.figures.all.values()
             ],
-            panels=[self.measuring.panel],
+            panels=[self._panels],
             tools=self.measuring.tools,
             dropper=self._dropper() if files is not None else None,
             sizing_mode="stretch_width",
@@ -167,9 +169,15 @@ class PageView:
             "cancel": self._on_cancel,
             "chip": self._on_chip,
             "save": self._on_save,
-            "painted": self.session.painted,
+            "painted": self._on_painted,
             "theme": self._on_theme,
         }
+
+    def _on_painted(self, number: int) -> None:
+        """Note that a picture is shown; after the first one the page gets what stands below."""
+        self.session.painted(number)
+        if not len(self._panels):
+            self._panels.append(self.measuring.panel)
 
     def _on_theme(self, theme: str) -> None:
         self.figures.set_theme(theme)
@@ -192,6 +200,7 @@ class PageView:
 
     def _on_ready(self, _: None) -> None:
         """Fill a page that has just been rendered, and compute its picture."""
+        self._lines = {}
         self._put_values()
         text = self._refused or "Computing the first picture."
         self._say(text, "error" if self._refused else "busy")
@@ -275,12 +284,23 @@ class PageView:
             self.opened.show(picture, model.frames(state), model.frame(state), measured)
         self._say(*self._described(picture))
         # The page draws the curves after the images: that halves the time to the images.
-        lines = {f"{name}_values": _columns(curves) for name, curves in picture.lines.items()}
-        content = {"number": number, "lines": lines, "absent": picture.absent}
+        content = {"number": number, "lines": self._changed_lines(picture)}
+        content["absent"] = picture.absent
         content["images"] = list(picture.panels)
         self._send("picture", content | {"quick": picture.quick})
         if numbers is not None:
             self._show_numbers(picture, numbers, {})
+
+    def _changed_lines(self, picture: Picture) -> dict[str, dict[str, Array]]:
+        """Return the curves that the page does not have: the cursor changes none of them."""
+        lines = {f"{name}_values": _columns(curves) for name, curves in picture.lines.items()}
+        changed = {
+            name: curves
+            for name, curves in lines.items()
+            if not _are_equal(curves, self._lines.get(name, {}))
+        }
+        self._lines = lines
+        return changed
 
     def _described(self, picture: Picture) -> tuple[str, str]:
         """Return the status of the page with a picture, and its kind."""
@@ -427,6 +447,12 @@ def _columns(curves: Mapping[str, Array]) -> dict[str, Array]:
     unknown = np.full_like(curves["along"], np.nan)
     drawn = {"corrected": unknown, **curves}
     return {key: np.asarray(curve) for key, curve in drawn.items() if key not in ("low", "high")}
+
+
+def _are_equal(curves: Mapping[str, Array], others: Mapping[str, Array]) -> bool:
+    return curves.keys() == others.keys() and all(
+        np.array_equal(curve, others[key], equal_nan=True) for key, curve in curves.items()
+    )
 
 
 def _largest(contributions: Mapping[str, float]) -> dict[str, float]:
