@@ -98,7 +98,6 @@ def judged(task):
         correct(measured, camera, doubtful, psf_uncertainty=WIDTH_KNOWN, **plain),
         correct(measured, CAMERA, moved, outline_uncertainty=0.5 * PITCH, **plain),
     )
-    found = results[-1].data["outline_motion"][0].values[:2] @ np.array(one.normal)
     scene = {
         "family": family,
         "kind": one.kind,
@@ -106,7 +105,7 @@ def judged(task):
         "view": view,
         "width": one.width,
         "netd": one.netd,
-        "outline_off": abs(found + shift) / PITCH,
+        "outline_off": one.outline_off(shift, results[-1].data["outline_motion"][0].values),
         "step": one.step,
         **one.conditions,
     }

@@ -107,6 +107,26 @@ class Known:
         with np.errstate(invalid="ignore"):
             return BAND.temperature(means(np.where(own, self.black, 0.0)) / means(own))
 
+    def outline_off(self, shift, motion):
+        """Return the distance from the outline to the found one in pixels (root mean square).
+
+        The stated outline is shifted along `normal` in m; `motion` is the estimated one: to the
+        right and up in m, and a turn in rad about the middle of the image.
+        """
+        spacing = PITCH / SAMPLES
+        on_outline = self.solid & (np.abs(self.to_tool) <= spacing)
+        if not on_outline.any():
+            return np.nan
+        row, column = np.nonzero(on_outline)
+        middle = (np.array(self.to_tool.shape) - 1) / 2
+        across, along = spacing * (column - middle[1]), spacing * (middle[0] - row)
+        down, right = np.gradient(self.to_tool)
+        normal = np.stack([right, -down])[:, on_outline]
+        normal /= np.linalg.norm(normal, axis=0)
+        moved = shift * np.array(self.normal) + motion[:2]
+        distance = normal.T @ moved + motion[2] * (normal[1] * across - normal[0] * along)
+        return np.sqrt(np.mean(distance**2)) / PITCH
+
     @property
     def step(self):
         """Relative change of the radiance across the outline, averaged along it."""

@@ -29,6 +29,9 @@ _FEW_POINTS: Final = 4
 _LEAST_AREA: Final = 2e-3
 """Smallest fraction of a cell for a part: a smaller one emits less than the model's error."""
 
+_BESIDE: Final = 3.0
+"""Distance in cells over which an outline at a wrong place bends the radiance: 1.5 pixels."""
+
 _ORDERS: Final = (3, 0), (2, 1), (1, 2), (0, 3), (4, 0), (2, 2), (0, 4)
 """Powers of the places to the right and down in the moments of third and fourth order."""
 
@@ -85,6 +88,17 @@ class Parts:
         found = np.full((zones, self.cells.rows * self.cells.columns), -1, np.intp)
         found[self.zone, self.cell] = np.arange(self.size)
         return found.reshape(zones, *self.cells.shape)
+
+    @cached_property
+    def beside_outline(self) -> NDArray[np.bool_]:
+        """Parts within `_BESIDE` cells of a cell without their zone."""
+        beside = np.zeros(self.size, np.bool_)
+        for zone, index in enumerate(self.index):
+            if (index < 0).any():
+                own = self.zone == zone
+                distance = distance_transform_edt(index >= 0).ravel()
+                beside[own] = distance[self.cell[own]] <= _BESIDE
+        return beside
 
     @cached_property
     def at_centroids(self) -> Any:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
+from itertools import chain
 from typing import Any, Final
 
 import numpy as np
@@ -27,6 +28,7 @@ from chipglow.correction.sensitivity import (
     outline_effect,
     smoothing_effect,
     systematic_effects,
+    systematic_images,
     texture_effect,
 )
 from chipglow.correction.zones import Motion, ObservedObject, ShapedObject, Zone, check_tools
@@ -220,10 +222,11 @@ def _corrected(
     room = float(known.surroundings.values)
     inside, notes = _image(measurement, frame, camera, noise, room)
     image = inside.extended(_MARGIN)
+    calibration = _calibration_images(measurement, frame)
     fit, former = None, None
     if known.outline_uncertainty:
         known, fit, former = _located(
-            image, camera, known, measurement.raster, lambda: progress(0.0)
+            image, camera, known, measurement.raster, calibration, lambda: progress(0.0)
         )
     problem = _problem_and_beyond(image, camera, known, measurement.raster)
     posterior = problem.solve(generator, lambda: progress(0.0), former)
@@ -235,7 +238,7 @@ def _corrected(
         smoothing_effect(posterior, generator),
         Effect("smoothing", BIAS_FACTOR * bias[None]),
         *texture_effect(posterior, known, generator),
-        *systematic_effects(posterior, known, _calibration_images(measurement, frame)),
+        *systematic_effects(posterior, known, calibration),
     ]
     if len(known.observed.zones) > 1:
         effects.append(outline_effect(posterior, known, fit))
@@ -312,22 +315,28 @@ def _received(displayed: Array, camera: Camera, pixels: Raster) -> tuple[Array, 
 
 
 def _located(
-    image: Image, camera: Camera, known: Knowledge, inner: Raster, check: Callable[[], None]
+    image: Image,
+    camera: Camera,
+    known: Knowledge,
+    inner: Raster,
+    calibration: list[Array],
+    check: Callable[[], None],
 ) -> tuple[Knowledge, OutlineFit, Posterior]:
     """Move the outlines to where the image shows them.
 
-    The prior has the same weights everywhere: weights that follow from the data would admit, where
-    an outline is wrong, the bends of the radiance that this error causes.
+    The prior is nearly even: weights that follow from the data would admit, where an outline is
+    wrong, the bends of the radiance that this error causes.
     """
-    posterior = _problem_and_beyond(image, camera, known, inner).smooth(check)
+    posterior = _problem_and_beyond(image, camera, known, inner).smooth_but_few(check)
+    systematic = [*chain(*systematic_images(posterior, known, calibration).values())]
     pixels = inner.widened(_MARGIN)
     for _ in range(_OUTLINE_ROUNDS):
-        fit = fit_outline(posterior, known)
+        fit = fit_outline(posterior, known, systematic)
         observed = known.observed.moved(_added(known.observed.motion, fit.motion))
         known = replace(known, observed=observed)
         if not fit.moves(_OUTLINE_FOUND):
             break
-        posterior = _problem(image, camera, known, pixels).smooth(check, posterior)
+        posterior = _problem(image, camera, known, pixels).smooth_but_few(check, posterior)
     return known, fit, posterior
 
 

@@ -177,6 +177,22 @@ class Problem:
             self.from_beyond = former.problem.from_beyond
         return self._maximum(start, _ROUGH_ERROR, check)
 
+    def smooth_but_few(
+        self, check: Callable[[], None], former: "Posterior | None" = None
+    ) -> "Posterior":
+        """Return the solution as `smooth` does, but few places may bend far more.
+
+        A gap or a burr is not in the model: it must not decide about the position of outlines. A
+        `former` solution is the start.
+        """
+        if former is None:
+            former = self.smooth(check)
+        start = former.problem.parts.continued(former.x, self.parts)
+        self.from_beyond = former.problem.from_beyond
+        squares = (self.curvature.matrix @ start) ** 2
+        self._weigh(self.curvature.few_larger(squares, self.parts, _START_CURVATURE**2))
+        return self._maximum(start, _ROUGH_ERROR, check)
+
     def solve(
         self,
         generator: np.random.Generator,

@@ -28,6 +28,13 @@ _LEAST_WEIGHT: Final = 1e-3
 """Smallest weight of a local mean: the weight of a value about six cells away."""
 
 
+_MEDIAN_SQUARE: Final = 0.455
+"""Median of the squares of a normal distribution over their mean."""
+
+_FAR_ABOVE: Final = 3.0
+"""Squares this many times their mean are not of a normal distribution: 8 % of its values are."""
+
+
 @dataclass(frozen=True, eq=False)
 class Curvature:
     """Second differences of the parts' values within zones: along rows, columns and mixed.
@@ -75,6 +82,19 @@ class Curvature:
                 median = np.median(around[weights > 0])
                 variance[own] = np.maximum(around, median)
         return np.maximum(variance, _LEAST_VARIANCE)
+
+    def few_larger(self, squares: Array, parts: Parts, usual: float) -> Array:
+        """Return variances that are `usual`, and larger for few differences (Cauchy distribution).
+
+        An outline at a wrong place bends the radiance along all of it, which must count: beside
+        outlines, only squares far above their median are of a few.
+        """
+        variance = usual + squares
+        beside = parts.beside_outline[self.part]
+        if beside.any():
+            typical = max(usual, float(np.median(squares[beside])) / _MEDIAN_SQUARE)
+            variance[beside] = usual * np.maximum(1.0, squares[beside] / (_FAR_ABOVE * typical))
+        return variance
 
 
 def slopes_within(parts: Parts) -> Any:
