@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from threading import Event, Thread
+from time import monotonic, sleep
 from types import SimpleNamespace
 
 import numpy as np
@@ -613,6 +614,28 @@ def test_only_the_newest_job_is_done():
     go.set()
     assert ended.wait(10)
     assert done == ["first", "fourth"]
+
+
+def test_the_error_of_a_job_that_is_no_longer_needed_is_not_shown():
+    begun, go, said = Event(), Event(), []
+
+    def work(job):
+        begun.set()
+        go.wait(10)
+        raise RuntimeError(job)  # as a pool does when the interpreter ends
+
+    newest = Newest(work, lambda kind, text: said.append(text))
+    newest.ask("first")
+    assert begun.wait(10)
+    newest.cancel()
+    go.set()
+    with newest._turn:
+        assert not said
+    newest.ask("second")
+    deadline = monotonic() + 10
+    while not said and monotonic() < deadline:
+        sleep(0.001)
+    assert said == ["defect: RuntimeError: second"]
 
 
 # Parts of the error

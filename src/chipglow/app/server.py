@@ -59,6 +59,7 @@ class App:
         # A page that asks for settings loads the scripts that the file's own page needs then.
         pn.extension("tabulator", "filedropper")
         self.files = OpenFiles(first)
+        self._views: set[PageView] = set()
         auth = TokenAuth()
         everywhere = address == "0.0.0.0"
         names = _own_names() if everywhere else {address, LOCAL, "localhost"}
@@ -94,6 +95,8 @@ class App:
 
     def stop(self) -> None:
         self.server.stop()
+        for view in self._views:
+            view.end()
         self.files.close()
 
     def _page(self) -> Any:
@@ -115,8 +118,13 @@ class App:
         """Return the page of an open file."""
         view = PageView(opened, given, {OPEN: key} if key else {}, self.files)
         view.start(document)
-        document.on_session_destroyed(lambda _: view.end())
+        self._views.add(view)
+        document.on_session_destroyed(lambda _: self._end(view))
         return view.page
+
+    def _end(self, view: PageView) -> None:
+        self._views.discard(view)
+        view.end()
 
 
 def _free_port(address: str, port: int) -> int:

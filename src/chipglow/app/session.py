@@ -75,6 +75,8 @@ class Newest(Generic[_Job]):
             except (ValueError, OSError) as error:
                 self._notify("failed", str(error))
             except Exception as error:  # a defect: it must not leave the page waiting
+                if superseded.is_set():
+                    return  # such as an error of a pool, which ends with the interpreter
                 _log.exception("chipglow app")
                 self._notify("failed", f"defect: {type(error).__name__}: {error}")
 
