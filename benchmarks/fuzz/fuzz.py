@@ -20,7 +20,9 @@ import resource
 import signal
 import sys
 import tempfile
+import traceback
 from collections import Counter
+from copy import deepcopy
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -92,7 +94,7 @@ def changed(content, random):
         if random.random() < 0.2:
             del inner[key]
         else:
-            inner[key] = random.choice(VALUES)
+            inner[key] = deepcopy(random.choice(VALUES))
         if not message or not inner:
             break
     return json.dumps(message).encode()
@@ -163,6 +165,7 @@ def _read_in_fork(outcome, numbers, begin):
 
 
 def _report_outcomes(outcome, numbers, begin, sender):
+    said = os.dup(2)
     try:
         begin()
         devnull = os.open(os.devnull, os.O_RDWR)
@@ -175,6 +178,7 @@ def _report_outcomes(outcome, numbers, begin, sender):
                 break
         os._exit(0)
     except BaseException:
+        os.write(said, traceback.format_exc().encode())
         os._exit(FAILED)
 
 
