@@ -88,10 +88,10 @@ def test_the_reading_is_the_closed_form_and_its_effects_sum_to_the_error():
     # The scene's temperatures are single floats: 1073 K is known to 6e-5 K.
     assert frame.error["peak temperature"] == pytest.approx(total, abs=1e-4)
     assert list(reading.contributions) == ["emissivity", "motion", "psf", "footprint"]
-    x = np.linspace(-60e-6, 60e-6, 4001)
-    profile = shown(x, 0.6)
-    level = (profile.max() + shown(150e-6, 0.6)) / 2
-    width = np.ptp(x[profile > level])
+    x = np.linspace(0.0, 60e-6, 201)
+    profile = shown(x, 0.6)  # falls from the middle on; the other side is the same
+    level = (profile[0] + shown(150e-6, 0.6)) / 2
+    width = 2 * np.interp(-level, -profile, x)
     # Straight lines between pixels of 6 um on a curve 45 um wide.
     assert 1e-6 * frame.shown["width at half of the rise"] == pytest.approx(width, rel=0.01)
     low, high = frame.low["peak temperature"], frame.high["peak temperature"]

@@ -206,12 +206,16 @@ def _row_weights(
 def _batches(
     scene: Scene, indices: range, fields: Collection[str] | None
 ) -> Iterator[tuple[int, list[Frame]]]:
-    """Yield batches of frames, each with the position of its first; read the next meanwhile."""
+    """Yield batches of frames, each with the position of its first; read from a file meanwhile."""
 
     def read(begin: int) -> list[Frame]:
         return [scene.frame(index, fields) for index in indices[begin : begin + BATCH]]
 
     begins = range(0, len(indices), BATCH)
+    if scene.in_memory or len(begins) == 1:
+        for begin in begins:
+            yield begin, read(begin)
+        return
     with ThreadPoolExecutor(1) as reader:
         pending = reader.submit(read, 0)
         for begin in begins:

@@ -128,8 +128,14 @@ class Sums:
 
 
 def _filled(arrays: list[NDArray[Any]]) -> tuple[NDArray[Any], ...]:
-    """Return `BATCH` arrays, the number that kernels are compiled for; the last ones are unused."""
-    return tuple((arrays + [arrays[-1]] * BATCH)[:BATCH])
+    """Return `BATCH` arrays, the number that kernels are compiled for; the last ones are unused.
+
+    Kernels are compiled for read-only arrays alone: they would be again for those of a memory map.
+    """
+    views = [array.view() for array in arrays]
+    for view in views:
+        view.flags.writeable = False
+    return tuple((views + [views[-1]] * BATCH)[:BATCH])
 
 
 def _batch(frames: Sequence[Frame], name: str) -> tuple[NDArray[Any], ...]:

@@ -48,7 +48,7 @@ def _search(known, at, found):  # type: ignore[no-untyped-def]
     """Look for the nearest known sample in squares that grow."""
     height, width = known.shape
     for index in range(len(at)):
-        row, column = at[index]
+        row, column = at[index, 0], at[index, 1]
         best = np.inf
         side = 1
         while side <= _REACH and side * side < best:
@@ -59,7 +59,8 @@ def _search(known, at, found):  # type: ignore[no-untyped-def]
                     apart = (other - row) ** 2 + (beside - column) ** 2
                     if 0 <= beside < width and apart < best and known[other, beside]:
                         best = apart
-                        found[index] = other, beside
+                        # A pair that is assigned takes Numba four times as long to compile.
+                        found[index, 0], found[index, 1] = other, beside
             side += 1
         if best > _REACH**2:
             found[index, 0] = -1  # one beyond the last square may be nearer

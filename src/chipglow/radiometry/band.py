@@ -364,7 +364,9 @@ def _look_up_temperature(radiance, first, cubics, temperature):
     missing = 0
     for begin in range(0, radiance.size, _BLOCK_VALUES):
         count = min(_BLOCK_VALUES, radiance.size - begin)
-        block[:count] = radiance[begin : begin + count]
+        # A slice that is assigned takes Numba ten times as long to compile.
+        for i in range(count):
+            block[i] = radiance[begin + i]
         # The bits of a positive number are in the order of the numbers.
         for i, bits in enumerate(block[:count].view(np.int64)):
             k = np.uint64((bits >> _SHIFT) - first)

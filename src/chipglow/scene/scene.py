@@ -177,10 +177,15 @@ class Scene:
         void = self.field("material", frame) == Material.VOID
         return np.where(void, np.nan, self.celsius(frame))
 
-    @property
+    @cached_property
     def times(self) -> NDArray[np.float64]:
         """Times of the frames in s."""
         return np.asarray(self.data["time"].values, dtype=np.float64)
+
+    @property
+    def in_memory(self) -> bool:
+        """Whether all fields are in memory, so that a frame takes no time to read."""
+        return self._whole
 
     @property
     def frame_spacing(self) -> float:

@@ -97,13 +97,21 @@ def largest(
     values: NDArray[np.floating], scene: Raster, sensors: Raster, fill_factor: float
 ) -> Array:
     """Return the largest value of the samples in every pixel's sensitive square; NaN for none."""
-    side = sensors.spacing * sqrt(fill_factor)
     known = np.where(np.isnan(values), values.dtype.type(-np.inf), values)
-    columns = _covered(sensors.x - scene.left, side, scene.columns, scene.spacing)
-    rows = _covered(scene.top - sensors.y, side, scene.rows, scene.spacing)
+    rows, columns = _samples_under(scene, sensors, fill_factor)
     down = np.stack([known[part].max(axis=0) for part in rows])
     maximum = np.stack([down[:, part].max(axis=1) for part in columns], axis=1)
     return np.where(np.isfinite(maximum), maximum, np.nan).astype(np.float64)
+
+
+@lru_cache(maxsize=256)  # as `line_weights`
+def _samples_under(
+    scene: Raster, sensors: Raster, fill_factor: float
+) -> tuple[list[slice], list[slice]]:
+    """Return the samples under the pixels, down and across."""
+    side = sensors.spacing * sqrt(fill_factor)
+    down = _covered(scene.top - sensors.y, side, scene.rows, scene.spacing)
+    return down, _covered(sensors.x - scene.left, side, scene.columns, scene.spacing)
 
 
 def _covered(centres: Array, side: float, samples: int, spacing: float) -> list[slice]:

@@ -24,6 +24,9 @@ _SAMPLES_PER_FOOTPRINT: Final = 8
 _PERIODS: Final = 64
 """Length of the table of an edge, in its largest distance: diffraction wraps around by 3e-6."""
 
+_FEW_PERIODS: Final = 16
+"""The same for light that ends, within 4 of these distances from the farthest pixel at most."""
+
 _TAIL_ENERGY: Final = 0.9999
 """Fraction of the light within the reach of a tail."""
 
@@ -45,6 +48,8 @@ _SMALLEST_DISC: Final = 0.1
 _LENGTHS: Final = ("fwhm", "diameter")
 _EVEN_DISC: Final = 30.0
 """A disc of this many deviations of its blur is half as bright at its rim, within its 2000th."""
+_BLUR_STEP: Final = 1 / 32
+"""Distance of the nodes of a blurred disc, in deviations of its blur."""
 _MOFFAT_NODES: Final = np.geomspace(1e-7, 60.0, 1000)
 """Arguments of the transfer function: it is 1 under and 0 over them."""
 
@@ -70,6 +75,8 @@ class PSFModel(ABC):
     name: str
     parameters: tuple[str, ...]
     """Names of its parameters; `is_length` marks those in m, others are pure numbers."""
+    periods: int = _PERIODS
+    """Length of the table of an edge, in its largest distance."""
 
     shapes: tuple[tuple[float, ...], ...] = ()
     """Parameters from which fits start; lengths over the full width at half maximum."""
@@ -141,6 +148,7 @@ class GaussianModel(PSFModel):
     """A round Gaussian; its transfer function is exp(−2π²σ²f²)."""
 
     name = "gaussian"
+    periods = _FEW_PERIODS
     parameters = ("fwhm",)
     shapes, lowest, highest = ((1.0,),), (_NARROWEST,), (inf,)
 
@@ -279,6 +287,7 @@ class DefocusedDiscModel(PSFModel):
     """An even disc, as a lens out of focus makes it, blurred by a Gaussian (Stokseth 1969)."""
 
     name = "defocused disc"
+    periods = _FEW_PERIODS
     parameters = ("disc_diameter", "blur_fwhm")
     # Hardly and much blurred.
     shapes = (1.0, 0.2), (1.0, 0.6)
@@ -303,6 +312,7 @@ class DefocusedRingModel(PSFModel):
     """An even ring, as a mirror objective out of focus makes it, blurred by a Gaussian."""
 
     name = "defocused ring"
+    periods = _FEW_PERIODS
     parameters = ("disc_diameter", "blur_fwhm", "obscured_area")
     # Hardly blurred with a small and a large obscuration, and much blurred.
     shapes = (1.0, 0.2, 0.2), (1.0, 0.2, 0.6), (1.0, 0.6, 0.2)
@@ -325,10 +335,22 @@ class DefocusedRingModel(PSFModel):
 
 
 def _blurred_disc(disc: float, sigma: float, radius: Array) -> Array:
-    """Return the light that a blur puts on points of a disc: the noncentral chi-squared."""
+    """Return the light that a blur puts on points of a disc: the noncentral chi-squared.
+
+    Of many radii it is a spline through nodes a 32nd of the blur's deviation apart: within 1e-7 of
+    the light in the middle.
+    """
     if disc > _EVEN_DISC * sigma:
         return np.asarray(ndtr((disc - radius) / sigma))
-    return np.asarray(chndtr((disc / sigma) ** 2, 2.0, (radius / sigma) ** 2))
+    place = radius / sigma
+    nodes = np.arange(0.0, float(place.max()) + 2 * _BLUR_STEP, _BLUR_STEP)
+    if place.size > nodes.size:
+        return np.asarray(CubicSpline(nodes, _noncentral(disc / sigma, nodes))(place))
+    return _noncentral(disc / sigma, place)
+
+
+def _noncentral(disc: float, place: Array) -> Array:
+    return np.asarray(chndtr(disc**2, 2.0, place**2))
 
 
 @dataclass(frozen=True)
@@ -338,6 +360,7 @@ class EllipticalModel(PSFModel):
     tilted: bool
     """Whether its axes may be tilted against the image's; that needs three orientations."""
     name = "elliptical gaussian"
+    periods = _FEW_PERIODS
     shapes = ((1.0, 1.0, 0.0),)
     # The last is a correlation: at 1 the spread would be a line.
     lowest, highest = (_NARROWEST, _NARROWEST, -0.99), (inf, inf, 0.99)
@@ -408,7 +431,7 @@ def edge_response(
 ) -> EdgeResponse:
     """Return the edge-spread function of optics and pixel; kept, as a residual's slopes need it."""
     step = footprint / _SAMPLES_PER_FOOTPRINT
-    count = fft.next_fast_len(ceil(_PERIODS * reach / step), real=True)
+    count = fft.next_fast_len(ceil(model.periods * reach / step), real=True)
     frequency, square = _footprint_along(count, step, angle, footprint)
     response = model.transfer(np.array(values), frequency, angle) * square
     integral = np.zeros(frequency.size, dtype=np.complex128)
@@ -454,17 +477,20 @@ def disc_response(frequency: Array, diameter: float, radii: Array, footprint: fl
 def sampled_kernel(
     density: Callable[[Array, Array], Array], reach: float, spacing: float
 ) -> tuple[Array, float]:
-    """Return the kernel of a density, integrated over squares, and their side in m."""
+    """Return the kernel of a density, integrated over squares, and their side in m.
+
+    Opposite places have the same density: half of the kernel is the other half, turned.
+    """
     spacing = max(spacing, 2 * reach / (_MOST_SIDE - 1))
     half = ceil(reach / spacing)
     node, weight = np.polynomial.legendre.leggauss(_KERNEL_NODES)
     line = spacing * (np.arange(-half, half + 1, dtype=np.float64)[:, None] + node / 2)
-    kernel = np.zeros((2 * half + 1, 2 * half + 1))
+    upper = np.zeros((half + 1, 2 * half + 1))
     for i in range(_KERNEL_NODES):
         for j in range(_KERNEL_NODES):
-            x, y = line[None, :, j], line[::-1, i, None]
-            kernel += weight[i] * weight[j] * density(x, y)
-    return kernel, spacing
+            x, y = line[None, :, j], line[: half - 1 : -1, i, None]
+            upper += weight[i] * weight[j] * density(x, y)
+    return np.concatenate([upper, upper[-2::-1, ::-1]]), spacing
 
 
 def _gaussian_transfer(fwhm: float, frequency: Array) -> Array:
