@@ -327,7 +327,7 @@ def _located(
     The prior is nearly even: weights that follow from the data would admit, where an outline is
     wrong, the bends of the radiance that this error causes.
     """
-    posterior = _problem_and_beyond(image, camera, known, inner).smooth_but_few(check)
+    posterior = _problem_and_beyond(image, camera, known, inner).smooth_robustly(check)
     systematic = [*chain(*systematic_images(posterior, known, calibration).values())]
     pixels = inner.widened(_MARGIN)
     for _ in range(_OUTLINE_ROUNDS):
@@ -336,7 +336,7 @@ def _located(
         known = replace(known, observed=observed)
         if not fit.moves(_OUTLINE_FOUND):
             break
-        posterior = _problem(image, camera, known, pixels).smooth_but_few(check, posterior)
+        posterior = _problem(image, camera, known, pixels).smooth_robustly(check, posterior)
     return known, fit, posterior
 
 

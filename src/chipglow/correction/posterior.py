@@ -177,10 +177,10 @@ class Problem:
             self.from_beyond = former.problem.from_beyond
         return self._maximum(start, _ROUGH_ERROR, check)
 
-    def smooth_but_few(
+    def smooth_robustly(
         self, check: Callable[[], None], former: "Posterior | None" = None
     ) -> "Posterior":
-        """Return the solution as `smooth` does, but few places may bend far more.
+        """Return the solution as `smooth` does, but robust against few places that bend far more.
 
         A gap or a burr is not in the model: it must not decide about the position of outlines. A
         `former` solution is the start.
@@ -190,7 +190,7 @@ class Problem:
         start = former.problem.parts.continued(former.x, self.parts)
         self.from_beyond = former.problem.from_beyond
         squares = (self.curvature.matrix @ start) ** 2
-        self._weigh(self.curvature.few_larger(squares, self.parts, _START_CURVATURE**2))
+        self._weigh(self.curvature.robust_variances(squares, self.parts, _START_CURVATURE**2))
         return self._maximum(start, _ROUGH_ERROR, check)
 
     def solve(

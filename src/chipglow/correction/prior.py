@@ -83,11 +83,11 @@ class Curvature:
                 variance[own] = np.maximum(around, median)
         return np.maximum(variance, _LEAST_VARIANCE)
 
-    def few_larger(self, squares: Array, parts: Parts, usual: float) -> Array:
-        """Return variances that are `usual`, and larger for few differences (Cauchy distribution).
+    def robust_variances(self, squares: Array, parts: Parts, usual: float) -> Array:
+        """Return variances that are `usual`, and larger where single differences are (Cauchy).
 
         An outline at a wrong place bends the radiance along all of it, which must count: beside
-        outlines, only squares far above their median are of a few.
+        outlines, only squares far above their median have a larger variance.
         """
         variance = usual + squares
         beside = parts.beside_outline[self.part]
