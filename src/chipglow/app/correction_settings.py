@@ -1,4 +1,4 @@
-"""What a page states for the correction of a measurement: in a session, and as controls."""
+"""Settings for the correction of a measurement: in a session, and as controls."""
 
 from pathlib import Path
 from typing import Any

@@ -116,7 +116,7 @@ class Image:
             return
         self._shown = panel.values
         left, right, bottom, top = (MICRONS * edge for edge in panel.raster.extent)
-        # Of an image without values, such as one that is not yet corrected, one pixel is enough.
+        # One pixel represents an image without values, such as one that is not yet corrected.
         values = panel.values if np.isfinite(panel.values).any() else _NOTHING
         self.source.data = {
             "image": [np.ascontiguousarray(values[::-1], np.float32)],

@@ -129,7 +129,7 @@ class MeasurementModel(_FramesModel):
     places: PlacesDescription | None = None
     """Places and view of the session that was opened."""
     regions: KnownRegions = field(default_factory=dict)
-    """Regions that a correction tells apart."""
+    """Regions that a correction distinguishes."""
     _last: dict[int, tuple[xr.Dataset, dict[str, Panel], str]] = field(
         init=False, default_factory=dict, repr=False
     )

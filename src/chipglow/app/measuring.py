@@ -175,7 +175,7 @@ class Measuring:
         self._change(lambda: self._marks.pop(number))
 
     def _change(self, act: Callable[[], Any]) -> None:
-        """Change the places, and show and read them; what is not possible is said."""
+        """Change the places, and show and read them; show an error if that is not possible."""
 
         def change() -> None:
             try:
@@ -244,7 +244,7 @@ class Measuring:
         readings = [self._reader.read(mark) for mark in self._marks]
         self._table = table_of(readings)
         known = [one.emissivity for one in self._marks]
-        # Objects: an empty field, by which a user removes an emissivity, is no number.
+        # Objects: an empty field, by which a user removes an emissivity, is not a number.
         rows = self._table.reindex(columns=[*_COLUMNS]).assign(
             emissivity=pd.Series([one.mean if one else nan for one in known], dtype=object),
             uncertainty=pd.Series([one.uncertainty if one else nan for one in known], dtype=object),

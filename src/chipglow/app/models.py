@@ -1,4 +1,4 @@
-"""What a page shows: a scene, a measurement or a correction."""
+"""The subject of a page: a scene, a measurement or a correction."""
 
 from typing import TypeAlias
 

@@ -53,10 +53,10 @@ class ShownImage(Brief):
 
 @dataclass(eq=False)
 class Opened:
-    """The open file of one page; `frames`, `frame` and `images` change with what the page shows.
+    """The open file of one page; `frames`, `frame` and `images` change with the shown picture.
 
     The keys of `figures`, Bokeh's figures with axes in µm, are the names of the images: ``scene``,
-    ``measured``, ``corrected``, ``half_width``, ``true`` and ``error``, as far as there are any.
+    ``measured``, ``corrected``, ``half_width``, ``true`` and ``error``, where available.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Opened:
     surroundings: tuple[float, float] | None = field(init=False, default=None)
     """Temperature of the reflected surroundings and its standard uncertainty in K, if stated."""
     correction: Mapping[str, Any] = field(init=False, default_factory=dict)
-    """What the page states for a correction, as a file of places does."""
+    """Settings of the page for a correction, as in a file of places."""
     _shown: Any = field(init=False, default=None, repr=False)
     _panels: Mapping[str, Panel] = field(init=False, default_factory=dict, repr=False)
     """Kept, so that no other arrays have their places in memory."""

@@ -69,7 +69,7 @@ _OTHER_OUTPUT: Final = {
     ("kernel", "edge1_esf"): "a point spread function, not an image: open the "
     "measurement, and name this file under PSF",
 }
-"""What files of other commands are, by the variables that only they have."""
+"""Contents of the files of other commands, by the variables that only they have."""
 
 _Points: TypeAlias = Iterable[Any]
 """Pairs of x and y in m."""

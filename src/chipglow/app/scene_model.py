@@ -99,7 +99,7 @@ _HARDLY_LARGER: Final = 1.5
 
 @dataclass(frozen=True, eq=False)
 class SceneFrames:
-    """Frames that the camera of a state makes of a scene, computed when they are asked for."""
+    """Frames of a scene by the camera of a state, computed when they are requested."""
 
     state: State
     scene: Scene

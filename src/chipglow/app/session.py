@@ -99,7 +99,7 @@ class Session:
         self._draws = Newest(self._draw, notify)
 
     def know(self, regions: KnownRegions) -> None:
-        """Set the regions of known emissivity, which a correction of a measurement tells apart."""
+        """Set the regions of known emissivity, which a correction distinguishes."""
         model = self.model
         if isinstance(model, MeasurementModel) and regions != model.regions:
             model.regions = regions

@@ -49,7 +49,7 @@ class Beyond:
     solved: Parts
     """Parts of the image and its margin, on the cells of `outer`."""
     inner: Parts
-    """Those of the image."""
+    """Parts of the image."""
     chosen: NDArray[np.intp]
     """Index of each inner part among those that are solved for.
 

@@ -90,7 +90,7 @@ class Image:
     noise: Array
     """Standard deviation in W/(m² sr)."""
     under_range: NDArray[np.bool_]
-    """Pixels below the range; their radiance and noise follow from what is probable below it."""
+    """Pixels below the range, with mean and standard deviation of the probable radiance."""
     lower_bound: NDArray[np.bool_]
     """Saturated pixels: their radiance is at least the stated one."""
     missing: NDArray[np.bool_]

@@ -43,7 +43,7 @@ Outlines of 40 analytic scenes for tuning of ``benchmarks/correction.py`` erred 
 """
 
 _CELLS_ALIKE: Final = 9.0
-"""Cells that bend alike, though the prior takes each for independent.
+"""Number of cells with similar bends, though the prior takes each for independent.
 
 With a ninth of the information, 28 of 29 outlines in cuts for tuning were within two standard
 uncertainties of the truth; with all of it 22.

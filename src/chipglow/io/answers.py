@@ -44,7 +44,7 @@ _LENGTH_BYTES: Final = 8
 
 
 class AnswerError(ValueError):
-    """Bytes that are no answer."""
+    """Bytes that are not an answer."""
 
 
 def write_answer(stream: IO[bytes], kind: str, value: Any = None) -> None:
@@ -65,7 +65,7 @@ def read_answer(stream: IO[bytes], most: int) -> tuple[str, Any]:
     EOFError
         If the stream ends before the message does.
     AnswerError
-        If the bytes are no message.
+        If the bytes are not a message.
     """
     length = int.from_bytes(_exactly(stream, _LENGTH_BYTES), "little")
     if length > min(most, _LONGEST_TEXT):

@@ -17,7 +17,7 @@ _LARGEST_MISFIT: Final = 4.0
 """Misfit above which the residuals are more than twice the noise: not by chance."""
 
 _APERTURE: Final = frozenset({"psf", "detector_pitch"})
-"""What a preset states from which its aperture at a magnification follows."""
+"""Values of a preset that determine its aperture at a magnification."""
 
 
 def correct_measured(

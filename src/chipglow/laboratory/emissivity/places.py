@@ -215,7 +215,7 @@ class PlacesDescription(Part):
         )
 
     def zones(self) -> tuple[Region, ...]:
-        """Return the regions with an emissivity, which a correction tells apart."""
+        """Return the regions with an emissivity, which a correction distinguishes."""
         return tuple(
             place
             for place in self.places()

@@ -337,8 +337,8 @@ class DefocusedRingModel(PSFModel):
 def _blurred_disc(disc: float, sigma: float, radius: Array) -> Array:
     """Return the light that a blur puts on points of a disc: the noncentral chi-squared.
 
-    Of many radii it is a spline through nodes a 32nd of the blur's deviation apart: within 1e-7 of
-    the light in the middle.
+    For many radii, a spline replaces it, with nodes a 32nd of the blur's deviation apart: within
+    1e-7 of the light in the middle.
     """
     if disc > _EVEN_DISC * sigma:
         return np.asarray(ndtr((disc - radius) / sigma))

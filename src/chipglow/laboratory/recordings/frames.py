@@ -114,7 +114,7 @@ class CameraFrames(_Frames):
         return self._converted(self._numbers[index])
 
     def close(self) -> None:
-        """End the process that reads the file, if there is one."""
+        """End the process that reads the file, if it is running."""
         self._process.close()
 
     def _converted(self, number: int) -> Measurement:
