@@ -34,8 +34,16 @@ PROGRAMS = {
         {"| middle of the chip": 4, "| rake face": 4},
     ),
     "app_latency.py": (
-        "--turns 1 --controls Seed",
-        {"Seed": 5, "all": 4, "opened, with the process": 2, "memory": 1},
+        "--turns 1 --controls Seed --frames 3",
+        {
+            "Seed": 5,
+            "all": 4,
+            "opened, with the process": 2,
+            "memory": 1,
+            "recording of 3 frames": 7,
+            "cursor, median": 6,
+            "  empty page": 6,
+        },
     ),
     "region_latency.py": (
         "--rows 48 --columns 60 --repeats 1",
@@ -143,6 +151,7 @@ def test_every_program_is_run():
     scripts = (path for path in FOLDER.rglob("*.py") if "__main__" in path.read_text("utf-8"))
     # These have tests of their own.
     names = {*PROGRAMS, "calibrate_cutting.py", "synthetic_laboratory.py"}
+    names.add("empty_page.py")  # app_latency.py runs it
     assert {path.relative_to(FOLDER).as_posix() for path in scripts} == names
 
 
