@@ -190,6 +190,8 @@ def test_a_loop_of_links_is_refused_by_name(tmp_path, monkeypatch, command):
         (MemoryError(), "not enough memory; choose fewer or coarser samples"),
         (RuntimeError("can't start new thread"), "the system starts no more threads"),
         (ImportError("_dop.so: failed to map segment from shared object"), "not enough memory to"),
+        (RuntimeError("FT_Open_Face failed: out of memory"), "not enough memory: FT_Open_Face"),
+        (SystemError("error return without exception set"), "probably not enough memory (error"),
     ],
 )
 def test_a_lack_of_memory_or_threads_is_one_line_with_a_hint(tmp_path, monkeypatch, error, text):

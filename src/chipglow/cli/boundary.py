@@ -26,6 +26,12 @@ _NO_THREAD: Final = "can't start new thread"
 _NO_ROOM: Final = "failed to map segment"
 """Message of the system if a limit of memory leaves no room for a library."""
 
+_OUT_OF_MEMORY: Final = "out of memory"
+"""End of a message of FreeType, which draws texts."""
+
+_NO_EXCEPTION: Final = "without exception set", "without setting an exception"
+"""Messages of Python if its own code failed for lack of memory, and had none to say so."""
+
 _FEWER: Final = "end other programs, raise the limit (ulimit -u), or set OMP_NUM_THREADS=1"
 _SMALLER: Final = "choose fewer or coarser samples, or end other programs"
 
@@ -83,6 +89,10 @@ class Boundary(TyperGroup):
             if _NO_ROOM not in str(error):
                 raise
             raise _ended(f"not enough memory to load a library; {_SMALLER}", FAILED) from None
+        except SystemError as error:
+            if not str(error).endswith(_NO_EXCEPTION):
+                raise
+            raise _ended(f"probably not enough memory ({error}); {_SMALLER}", FAILED) from None
         except RuntimeError as error:
             from chipglow.cutting import SolverError
 
@@ -90,6 +100,8 @@ class Boundary(TyperGroup):
                 raise _ended(
                     f"the system starts no more threads or processes; {_FEWER}", FAILED
                 ) from None
+            if str(error).endswith(_OUT_OF_MEMORY):
+                raise _ended(f"not enough memory: {_one_line(error)}; {_SMALLER}", FAILED) from None
             if not isinstance(error, SolverError):
                 raise
             raise _ended(_one_line(error), FAILED) from None
