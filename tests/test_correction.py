@@ -19,6 +19,7 @@ from chipglow.correction import (
 )
 from chipglow.correction.cells import cut_cells
 from chipglow.correction.posterior import Image, Problem
+from chipglow.correction.sensitivity import _OUTLINE_ERROR, Knowledge, _motion_images, fit_outline
 from chipglow.correction.zones import Motion, ShapedObject
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.emissivity import EmissivityLine
@@ -157,16 +158,22 @@ def test_intervals_hold_the_truth(chip_and_tool):
     assert held.mean() > 0.95 - 3 * 0.024
 
 
-def test_the_solution_is_that_of_a_dense_newton_method():
-    """The same objective, with dense matrices and finite differences, has the same minimum."""
-    kelvins, emissivity, samples, pixels = scene(8)
+def problem_of(count):
+    """Return the problem of an image of `scene`, and its measurement."""
+    kelvins, emissivity, samples, pixels = scene(count)
     image = measured(kelvins, emissivity, samples, pixels)
     parts = cut_cells(ShapedObject(tuple(zones(pixels)), pixels), pixels)
     formation = ImageFormation(parts.cells, pixels, CAMERA.psf, False, 1.0)
     noise = np.full(pixels.shape, 0.5 * float(BAND.slope(600.0)))
     nothing = np.zeros(pixels.shape, bool)
     data = Image(image.radiance[0], noise, nothing, nothing, nothing)
-    problem = Problem(data, parts, formation, np.zeros(pixels.shape))
+    return Problem(data, parts, formation, np.zeros(pixels.shape)), image
+
+
+def test_the_solution_is_that_of_a_dense_newton_method():
+    """The same objective, with dense matrices and finite differences, has the same minimum."""
+    problem, image = problem_of(8)
+    parts, formation, noise = problem.parts, problem.formation, problem.image.noise
     posterior = problem.solve(np.random.default_rng(1), lambda: None)
     curvature, slopes = problem.curvature.matrix.toarray(), problem.slopes.toarray()
     prior = curvature.T @ (posterior.prior_weights[:, None] * curvature) + slopes.T @ slopes
@@ -255,14 +262,19 @@ def test_cells_are_cut_exactly():
         assert abs(found - expected) < 0.01
 
 
-@pytest.mark.parametrize("off", [0.45, -0.45])
-def test_the_outline_of_a_heated_chip_is_found_and_does_not_slide_along_itself(off):
+def heated_chip():
+    """Return temperature, distance to the outline and emissivity on samples, and the rasters."""
     _, emissivity, samples, pixels = scene()
     x, y = np.meshgrid(samples.x, samples.y)
-    edge = EDGE * 24 * PITCH + 0.2 * y
-    chip = 850.0 + 300.0 * np.exp(np.minimum(x - edge, 0.0) / (5 * PITCH))
-    tool = 450.0 + 700.0 * np.exp(-np.maximum(x - edge, 0.0) / (12 * PITCH))
-    kelvins = np.where(emissivity == 0.58, tool, chip)
+    right = x - EDGE * 24 * PITCH - 0.2 * y
+    chip = 850.0 + 300.0 * np.exp(np.minimum(right, 0.0) / (5 * PITCH))
+    tool = 450.0 + 700.0 * np.exp(-np.maximum(right, 0.0) / (12 * PITCH))
+    return np.where(emissivity == 0.58, tool, chip), right, emissivity, samples, pixels
+
+
+@pytest.mark.parametrize("off", [0.45, -0.45])
+def test_the_outline_of_a_heated_chip_is_found_and_does_not_slide_along_itself(off):
+    kelvins, _, emissivity, samples, pixels = heated_chip()
     image = measured(kelvins, emissivity, samples, pixels)
     moved = zones(pixels, EDGE + off / 24)
     result = correct(
@@ -274,6 +286,38 @@ def test_the_outline_of_a_heated_chip_is_found_and_does_not_slide_along_itself(o
     assert abs(motion @ normal + off * normal[0]) < 0.05
     # Nothing shows a motion along a straight outline: it stays below its standard uncertainty.
     assert abs(motion @ [normal[1], -normal[0]]) < 0.5
+
+
+def test_a_gap_at_the_outline_does_not_move_it():
+    kelvins, right, emissivity, samples, pixels = heated_chip()
+    up = np.meshgrid(samples.x, samples.y)[1] - 6 * PITCH
+    gap = (np.abs(right - 0.5 * PITCH) < PITCH) & (np.abs(up) < PITCH)
+    image = measured(np.where(gap, 300.0, kelvins), emissivity, samples, pixels, netd=0.1)
+    off = 0.2
+    moved = zones(pixels, EDGE + off / 24)
+    result = correct(
+        image, CAMERA, moved, surroundings=DARK, noise=0.1, outline_uncertainty=0.5 * PITCH
+    )
+    normal = np.array([1.0, -0.2]) / np.hypot(1.0, 0.2)
+    found = result.data["outline_motion"][0].values[:2] / PITCH @ normal
+    # Two of its smallest standard uncertainties; with an even prior the gap moves it by 0.36.
+    assert abs(found + off * normal[0]) < 2 * _OUTLINE_ERROR
+
+
+def test_an_error_that_looks_like_a_motion_leaves_the_position_uncertain():
+    problem, _ = problem_of(16)
+    observed = ShapedObject(tuple(zones(problem.parts.pixels)), problem.parts.pixels)
+    stated, error = 0.5 * PITCH, 0.3 * PITCH
+    known = Knowledge(observed, BAND, 0.0, stated, DARK)
+    posterior = problem.smooth(lambda: None)
+    like_a_motion = error * _motion_images(posterior, known)[0]
+    alone, both = (
+        fit_outline(posterior, known, images).standard_uncertainty.right
+        for images in ([], [like_a_motion])
+    )
+    # The image shows the sum of both at most, which leaves this much of the motion undetermined.
+    least = stated * error / np.hypot(stated, error)
+    assert alone < least < both < stated + _OUTLINE_ERROR * PITCH
 
 
 def test_the_radiance_continues_beyond_the_image():

@@ -106,9 +106,8 @@ def outcomes_of(prepare, read, numbers):
     A fork reads one case after another, until one ends it. Memory that runs out after other cases
     may be theirs: such a case is read once more, in a fork of its own.
     """
-    found, numbers = [], list(numbers)
+    found, outcome = [], partial(_read_alone, prepare, read)
     while len(found) < len(numbers) and found.count("hang") < ENOUGH_HANGS:
-        outcome = partial(_read_alone, prepare, read)
         ended, code = _read_in_fork(outcome, numbers[len(found) :], leave_sandbox)
         if ended[-1:] == ["memory"] and len(ended) > 1:
             ended.pop()

@@ -173,8 +173,7 @@ class Problem:
             if self.beyond is not None:
                 self.from_beyond = self.beyond.image(self.beyond.constant(start))
         else:
-            start = former.problem.parts.continued(former.x, self.parts)
-            self.from_beyond = former.problem.from_beyond
+            start = self._start_from(former)
         return self._maximum(start, _ROUGH_ERROR, check)
 
     def smooth_robustly(
@@ -185,10 +184,7 @@ class Problem:
         A gap or a burr is not in the model: it must not decide about the position of outlines. A
         `former` solution is the start.
         """
-        if former is None:
-            former = self.smooth(check)
-        start = former.problem.parts.continued(former.x, self.parts)
-        self.from_beyond = former.problem.from_beyond
+        start = self._start_from(former or self.smooth(check))
         squares = (self.curvature.matrix @ start) ** 2
         self._weigh(self.curvature.robust_variances(squares, self.parts, _START_CURVATURE**2))
         return self._maximum(start, _ROUGH_ERROR, check)
@@ -223,6 +219,11 @@ class Problem:
             return posterior.x
         self.from_beyond = self.beyond.image(posterior.beyond)
         return self.beyond.with_margin(posterior.x, posterior.beyond)
+
+    def _start_from(self, former: "Posterior") -> Array:
+        """Return a former solution at the present parts; the light from beyond is that of it."""
+        self.from_beyond = former.problem.from_beyond
+        return former.problem.parts.continued(former.x, self.parts)
 
     def _start(self) -> Array:
         """Return the solution without blur: each cell has the radiance of its pixel."""

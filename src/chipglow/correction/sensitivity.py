@@ -270,29 +270,23 @@ def fit_outline(posterior: Posterior, known: Knowledge, systematic: Sequence[Arr
     turn_radius = _turn_radius(posterior.problem.parts)
     images = [*_motion_images(posterior, known), *systematic]
     responses = posterior.changed_all(images, _RESPONSE_TOLERANCE)
-    weights, gradient = posterior.pixel_weights, posterior.gradient
-    unexplained = [
-        image - posterior.seen_change(response)
-        for image, response in zip(images, responses, strict=True)
-    ]
+    weights, changes = posterior.pixel_weights, np.stack(images)
+    unexplained = changes - np.stack([posterior.seen_change(one) for one in responses])
     # These sums over data and prior depend on errors of the responses in the second order only.
-    information = np.array(
-        [[(weights * one * other).sum() for other in unexplained] for one in unexplained]
-    )
+    information = np.tensordot(weights * unexplained, unexplained, ((1, 2), (1, 2)))
     information += responses @ (posterior.bending @ responses.T)
-    slope = np.array([(weights * image * posterior.residual).sum() for image in images])
-    slope -= responses @ gradient
+    slope = np.tensordot(changes, weights * posterior.residual) - responses @ posterior.gradient
     deviations = np.ones(len(images))
     deviations[:3] = known.outline_uncertainty
     scale = np.array([1.0, 1.0, 1 / turn_radius])
     former = np.zeros(len(images))
     former[:3] = np.array(astuple(known.observed.motion)) / scale
-    covariance = np.linalg.inv(information / _CELLS_ALIKE + np.diag(deviations**-2.0))[:3]
-    motion = covariance @ (slope / _CELLS_ALIKE - former / deviations**2)
+    covariance = np.linalg.inv(information / _CELLS_ALIKE + np.diag(deviations**-2.0))
+    motion = (covariance @ (slope / _CELLS_ALIKE - former / deviations**2))[:3]
     # Without an outline in the image, the motion is zero.
     motion *= known.outline_uncertainty / max(np.abs(motion).max(), known.outline_uncertainty)
-    covariance = covariance[:, :3]
-    covariance += np.eye(3) * (_OUTLINE_ERROR * posterior.problem.parts.pixels.spacing) ** 2
+    least = _OUTLINE_ERROR * posterior.problem.parts.pixels.spacing
+    covariance = covariance[:3, :3] + least**2 * np.eye(3)
     spread = np.sqrt(np.diag(covariance)) * scale
     root = np.asarray(np.linalg.cholesky((covariance + covariance.T) / 2), np.float64)
     return OutlineFit(Motion(*(motion * scale)), root, Motion(*spread), turn_radius)

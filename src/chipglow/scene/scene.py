@@ -99,8 +99,9 @@ class Scene:
         last = len(self.times) - 1
         arrays = {name: data[name].variable._data for name in self.fields}
         self._arrays = {name: a for name, a in arrays.items() if isinstance(a, np.ndarray)}
-        self._whole = len(self._arrays) == len(arrays)
-        for index in range(last + 1) if self._whole else {0, last}:
+        self.in_memory = len(self._arrays) == len(arrays)
+        """Whether all fields are in memory, so that a frame takes no time to read."""
+        for index in range(last + 1) if self.in_memory else {0, last}:
             check_frame(self._unchecked(index, None))
 
     @classmethod
@@ -183,11 +184,6 @@ class Scene:
         return np.asarray(self.data["time"].values, dtype=np.float64)
 
     @property
-    def in_memory(self) -> bool:
-        """Whether all fields are in memory, so that a frame takes no time to read."""
-        return self._whole
-
-    @property
     def frame_spacing(self) -> float:
         """Usual time between frames in s: the median; 0 for a single frame."""
         times = self.times
@@ -264,7 +260,7 @@ class Scene:
     def frame(self, index: int, names: Collection[str] | None = None) -> Frame:
         """Read and check one frame: temperature, material and the named fields, by default all."""
         frame = self._unchecked(index, names)
-        if not self._whole:
+        if not self.in_memory:
             check_frame(frame)
         return frame
 
