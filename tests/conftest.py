@@ -1,6 +1,5 @@
 """Shared by the tests: profiles of Hypothesis, the quick study, the registry of flow laws."""
 
-import gc
 import os
 import subprocess
 import sys
@@ -37,11 +36,6 @@ class QuickStudy(NamedTuple):
     results: object
     cache: object
     printed: str
-
-
-def pytest_collection_finish():
-    """What was collected stays: without it, collecting garbage takes less time."""
-    gc.freeze()
 
 
 def pytest_collection_modifyitems(items):
