@@ -19,7 +19,13 @@ from chipglow.correction import (
 )
 from chipglow.correction.cells import cut_cells
 from chipglow.correction.posterior import Image, Problem
-from chipglow.correction.sensitivity import _OUTLINE_ERROR, Knowledge, _motion_images, fit_outline
+from chipglow.correction.sensitivity import (
+    _OUTLINE_ERROR,
+    Knowledge,
+    LinearErrors,
+    _motion_images,
+    fit_outline,
+)
 from chipglow.correction.zones import Motion, ShapedObject
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.emissivity import EmissivityLine
@@ -312,7 +318,7 @@ def test_an_error_that_looks_like_a_motion_leaves_the_position_uncertain():
     posterior = problem.smooth(lambda: None)
     like_a_motion = error * _motion_images(posterior, known)[0]
     alone, both = (
-        fit_outline(posterior, known, images).standard_uncertainty.right
+        fit_outline(posterior, known, LinearErrors.of(posterior, images)).standard_uncertainty.right
         for images in ([], [like_a_motion])
     )
     # The image shows the sum of both at most, which leaves this much of the motion undetermined.

@@ -305,6 +305,14 @@ class Posterior:
         return float(data + self.x @ (self.bending @ self.x)) / 2
 
     @property
+    def robust_loss(self) -> float:
+        """Sum of data and bends that `Problem.smooth_robustly` minimises: small where all fits."""
+        problem = self.problem
+        squares = (problem.curvature.matrix @ self.x) ** 2
+        bends = problem.curvature.robust_loss(squares, problem.parts, _START_CURVATURE**2)
+        return bends + float((self.pixel_weights * self.residual**2).sum()) / 2
+
+    @property
     def gradient(self) -> Array:
         return np.asarray(self.response(self.residual) - self.bending @ self.x)
 
@@ -365,6 +373,8 @@ class Posterior:
         self, right_sides: Sequence[Array], error: float, relative: float = 0.0
     ) -> Array:
         """Solve for right sides together, a part of them in each thread."""
+        if not right_sides:
+            return np.empty((0, self.x.size))
         columns = np.stack(right_sides, axis=1)
         blocks = np.array_split(columns, min(get_num_threads(), columns.shape[1]), axis=1)
         with ThreadPoolExecutor(len(blocks)) as pool:

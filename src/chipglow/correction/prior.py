@@ -28,11 +28,8 @@ _LEAST_WEIGHT: Final = 1e-3
 """Smallest weight of a local mean: the weight of a value about six cells away."""
 
 
-_MEDIAN_SQUARE: Final = 0.455
-"""Median of the squares of a normal distribution over their mean."""
-
 _FAR_ABOVE: Final = 3.0
-"""Squares this many times their mean are not of a normal distribution: 8 % of its values are."""
+"""Squares this many times their usual mean are large: 8 % of those of a normal distribution are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +84,19 @@ class Curvature:
         """Return variances that are `usual`, and larger where single differences are (Cauchy).
 
         An outline at a wrong place bends the radiance along all of it, which must count: beside
-        outlines, only squares far above their median have a larger variance.
+        outlines, only squares far above the usual ones have a larger variance.
         """
-        variance = usual + squares
         beside = parts.beside_outline[self.part]
-        if beside.any():
-            typical = max(usual, float(np.median(squares[beside])) / _MEDIAN_SQUARE)
-            variance[beside] = usual * np.maximum(1.0, squares[beside] / (_FAR_ABOVE * typical))
-        return variance
+        far = usual * np.maximum(1.0, squares / (_FAR_ABOVE * usual))
+        return np.where(beside, far, usual + squares)
+
+    def robust_loss(self, squares: Array, parts: Parts, usual: float) -> float:
+        """Return the sum that solutions with `robust_variances` of their own squares minimise."""
+        beside = parts.beside_outline[self.part]
+        relative = squares / usual
+        excess = np.maximum(relative / _FAR_ABOVE, 1.0)
+        near = np.minimum(relative, _FAR_ABOVE) + _FAR_ABOVE * np.log(excess)
+        return float(np.where(beside, near, np.log1p(relative)).sum()) / 2
 
 
 def slopes_within(parts: Parts) -> Any:

@@ -258,18 +258,52 @@ class OutlineFit:
         lengths = np.array(astuple(self.motion)) * (1.0, 1.0, self.turn_radius)
         return bool(np.linalg.norm(np.linalg.solve(self.root, lengths)) >= least)
 
+    def shown(self, most: float) -> Array:
+        """Return the directions (right, up) in which the standard uncertainty is below `most` m."""
+        variances, directions = np.linalg.eigh((self.root @ self.root.T)[:2, :2])
+        return np.asarray(directions.T[variances < most**2])
 
-def fit_outline(posterior: Posterior, known: Knowledge, systematic: Sequence[Array]) -> OutlineFit:
+    def doubted(self, shift: Array) -> "OutlineFit":
+        """Return the fit if the outlines may as well be displaced by `shift` (right, up) in m."""
+        covariance = self.root @ self.root.T
+        covariance[:2, :2] += np.outer(shift, shift) / 4
+        return _outline_fit(self.motion, covariance, self.turn_radius)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearErrors:
+    """Systematic errors that are estimated with the outlines' position."""
+
+    images: Sequence[Array]
+    """Changes of the image by one standard uncertainty each."""
+    responses: Array
+    """Changes of the solution by those of the image, (error, part)."""
+    parts: Parts
+
+    @classmethod
+    def of(cls, posterior: Posterior, images: Sequence[Array]) -> "LinearErrors":
+        responses = posterior.changed_all(images, _RESPONSE_TOLERANCE)
+        return cls(images, responses, posterior.problem.parts)
+
+    def responses_at(self, parts: Parts) -> Array:
+        """Return the responses at the parts of other outlines, without solving again."""
+        responses = [self.parts.continued(one, parts) for one in self.responses]
+        return np.reshape(responses, (len(self.images), parts.size))
+
+
+def fit_outline(posterior: Posterior, known: Knowledge, systematic: LinearErrors) -> OutlineFit:
     """Estimate the motion of the outlines together with the radiance, linearised.
 
     The image shows the position where the radiance changes across an outline. Where it does not,
-    the stated uncertainty remains. A motion is not larger than that uncertainty. The changes of the
-    image by `systematic` errors of one standard uncertainty each are estimated too: they may look
-    like a motion.
+    the stated uncertainty remains. A motion is not larger than that uncertainty. The `systematic`
+    errors are estimated too: they may look like a motion.
     """
     turn_radius = _turn_radius(posterior.problem.parts)
-    images = [*_motion_images(posterior, known), *systematic]
-    responses = posterior.changed_all(images, _RESPONSE_TOLERANCE)
+    motions = _motion_images(posterior, known)
+    images = [*motions, *systematic.images]
+    of_motions = posterior.changed_all(motions, _RESPONSE_TOLERANCE)
+    others = systematic.responses_at(posterior.problem.parts)
+    responses = np.concatenate([of_motions, others])
     weights, changes = posterior.pixel_weights, np.stack(images)
     unexplained = changes - np.stack([posterior.seen_change(one) for one in responses])
     # These sums over data and prior depend on errors of the responses in the second order only.
@@ -287,9 +321,14 @@ def fit_outline(posterior: Posterior, known: Knowledge, systematic: Sequence[Arr
     motion *= known.outline_uncertainty / max(np.abs(motion).max(), known.outline_uncertainty)
     least = _OUTLINE_ERROR * posterior.problem.parts.pixels.spacing
     covariance = covariance[:3, :3] + least**2 * np.eye(3)
-    spread = np.sqrt(np.diag(covariance)) * scale
+    return _outline_fit(Motion(*(motion * scale)), covariance, turn_radius)
+
+
+def _outline_fit(motion: Motion, covariance: Array, turn_radius: float) -> OutlineFit:
+    """Return the fit of a motion with its covariance in m², turns at their radius."""
+    spread = np.sqrt(np.diag(covariance)) / (1.0, 1.0, turn_radius)
     root = np.asarray(np.linalg.cholesky((covariance + covariance.T) / 2), np.float64)
-    return OutlineFit(Motion(*(motion * scale)), root, Motion(*spread), turn_radius)
+    return OutlineFit(motion, root, Motion(*spread), turn_radius)
 
 
 def outline_effect(posterior: Posterior, known: Knowledge, fit: OutlineFit | None) -> Effect:
@@ -310,22 +349,17 @@ def _turn_radius(parts: Parts) -> float:
 
 def _motion_images(posterior: Posterior, known: Knowledge) -> list[Array]:
     """Return the changes of the image with a motion to the right, up and with a turn, per m."""
-    radius = _turn_radius(posterior.problem.parts)
-    return [_motion_image(posterior, known.observed, direction, radius) for direction in np.eye(3)]
-
-
-def _motion_image(
-    posterior: Posterior, observed: ObservedObject, direction: Array, turn_radius: float
-) -> Array:
-    """Return the change of the image with a motion of the outlines, per m."""
-    step = _OUTLINE_STEP * posterior.problem.parts.pixels.spacing
-    images = []
-    for sign in (1.0, -1.0):
-        shift = sign * step * direction
-        right, up, turn = astuple(observed.motion)
-        moved = Motion(right + shift[0], up + shift[1], turn + shift[2] / turn_radius)
-        images.append(_image_of_moved(posterior, observed.moved(moved)))
-    return np.asarray((images[0] - images[1]) / (2 * step))
+    parts = posterior.problem.parts
+    step = _OUTLINE_STEP * parts.pixels.spacing
+    right, up, turn = astuple(known.observed.motion)
+    motions = (
+        Motion(right + step, up, turn),
+        Motion(right, up + step, turn),
+        Motion(right, up, turn + step / _turn_radius(parts)),
+    )
+    at_rest = posterior.seen(posterior.sent)
+    images = (_image_of_moved(posterior, known.observed.moved(motion)) for motion in motions)
+    return [np.asarray((image - at_rest) / step) for image in images]
 
 
 def _image_of_moved(posterior: Posterior, observed: ObservedObject) -> Array:
