@@ -194,6 +194,22 @@ class Parts:
                 found[own] = values[index[tuple(nearest)]].ravel()[others.cell[own]]
         return found
 
+    def displacement(self, others: "Parts") -> float:
+        """Return the mean distance in pixels between these outlines and those of `others`.
+
+        Where an outline crosses a cell, the areas of the cell's parts change.
+        """
+        cells = self.cells.rows * self.cells.columns
+        zones = 1 + max(self.zone.max(), others.zone.max())
+        before, after = (
+            np.bincount(one.zone * cells + one.cell, one.area, zones * cells)
+            for one in (self, others)
+        )
+        changed = np.abs(after - before)
+        cut = np.minimum(before, after) < 1 - _LEAST_AREA
+        cut &= np.maximum(before, after) > _LEAST_AREA
+        return float(changed[cut].mean()) / CELLS_PER_PIXEL if cut.any() else 0.0
+
     def within(self, others: "Parts") -> "Parts":
         """Return the parts on the cells of `others`, which contain their cells."""
         row, column = np.divmod(self.cell, self.cells.columns)

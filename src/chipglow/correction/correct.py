@@ -51,8 +51,8 @@ of a twenty-fourth of a pixel: up to 3e-4 of the radiance.
 _READINGS: Final = 256
 """Readings below the range of which the mean is taken; an integral, to 1 %."""
 
-_OUTLINE_ROUNDS: Final = 8
-"""Most rounds in which the outlines move to fit the image."""
+_OUTLINE_ROUNDS: Final = 25
+"""Most rounds in which the outlines move to fit the image; 2 to 5 are usual, far away up to 15."""
 
 _OUTLINE_FOUND: Final = 0.5
 """Last motion of the outlines in standard uncertainties: the next one would be a tenth of it."""
@@ -70,6 +70,9 @@ the edge had 0.85 to 0.95 of the loss at the outline."""
 
 _LEVEL_FACTOR: Final = 2.0
 """Standard uncertainties within which positions are looked for: 95 % of them."""
+
+_OUTLINE_STILL: Final = 0.005
+"""Mean displacement in pixels that changes nothing: outlines may slide along themselves."""
 
 _BORDER: Final = 3
 """Width in pixels of the border whose values depend on radiance from beyond the image."""
@@ -348,19 +351,18 @@ def _located(
     """
     pixels = inner.widened(_MARGIN)
 
-    def solved(observed: ObservedObject, former: Posterior) -> Posterior:
-        problem = _problem(image, camera, replace(known, observed=observed), pixels)
-        return problem.smooth_robustly(check, former)
+    def problem_of(observed: ObservedObject) -> Problem:
+        return _problem(image, camera, replace(known, observed=observed), pixels)
 
     posterior = _problem_and_beyond(image, camera, known, inner).smooth_robustly(check)
     images = [*chain(*systematic_images(posterior, known, calibration).values())]
     systematic = LinearErrors.of(posterior, images)
-    found, fit, posterior = _moved_to_fit(posterior, known, systematic, solved)
+    found, fit, posterior = _moved_to_fit(posterior, known, systematic, problem_of, check)
     for shift in _shifts_elsewhere(found, fit, inner.spacing):
         elsewhere = _shifted(found, shift)
-        other = solved(elsewhere.observed, posterior)
+        other = problem_of(elsewhere.observed).smooth_robustly(check, posterior)
         if other.robust_loss < _FAR_LESS * posterior.robust_loss:
-            return _moved_to_fit(other, elsewhere, systematic, solved)
+            return _moved_to_fit(other, elsewhere, systematic, problem_of, check)
         if other.robust_loss < posterior.robust_loss:
             fit = fit.doubted(shift)
     return found, fit, posterior
@@ -370,7 +372,8 @@ def _moved_to_fit(
     posterior: Posterior,
     known: Knowledge,
     systematic: LinearErrors,
-    solved: Callable[[ObservedObject, Posterior], Posterior],
+    problem_of: Callable[[ObservedObject], Problem],
+    check: Callable[[], None],
 ) -> tuple[Knowledge, OutlineFit, Posterior]:
     """Move the outlines until they fit the image."""
     for _ in range(_OUTLINE_ROUNDS):
@@ -379,7 +382,10 @@ def _moved_to_fit(
         known = replace(known, observed=observed)
         if not fit.moves(_OUTLINE_FOUND):
             break
-        posterior = solved(observed, posterior)
+        problem = problem_of(observed)
+        if posterior.problem.parts.displacement(problem.parts) < _OUTLINE_STILL:
+            break
+        posterior = problem.smooth_robustly(check, posterior)
     return known, fit, posterior
 
 

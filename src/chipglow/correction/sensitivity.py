@@ -351,15 +351,16 @@ def _motion_images(posterior: Posterior, known: Knowledge) -> list[Array]:
     """Return the changes of the image with a motion to the right, up and with a turn, per m."""
     parts = posterior.problem.parts
     step = _OUTLINE_STEP * parts.pixels.spacing
-    right, up, turn = astuple(known.observed.motion)
-    motions = (
-        Motion(right + step, up, turn),
-        Motion(right, up + step, turn),
-        Motion(right, up, turn + step / _turn_radius(parts)),
-    )
-    at_rest = posterior.seen(posterior.sent)
-    images = (_image_of_moved(posterior, known.observed.moved(motion)) for motion in motions)
-    return [np.asarray((image - at_rest) / step) for image in images]
+    motion, scale = np.array(astuple(known.observed.motion)), (1.0, 1.0, _turn_radius(parts))
+    images = []
+    for direction in np.eye(3):
+        ahead, behind = (
+            known.observed.moved(Motion(*(motion + sign * step * direction / scale)))
+            for sign in (1.0, -1.0)
+        )
+        change = _image_of_moved(posterior, ahead) - _image_of_moved(posterior, behind)
+        images.append(np.asarray(change / (2 * step)))
+    return images
 
 
 def _image_of_moved(posterior: Posterior, observed: ObservedObject) -> Array:
