@@ -24,6 +24,7 @@ from chipglow.cli.emissivity import emissivity, temperature
 from chipglow.cli.materials import materials
 from chipglow.cli.register import register
 from chipglow.cli.screen import current
+from chipglow.cli.shortage import was_short_of_memory
 from chipglow.cli.sources import convert, import_source
 from chipglow.cli.streams import tolerate_failures
 from chipglow.cli.studies import cut, error, measure, reproduce, run, wavelengths
@@ -73,7 +74,7 @@ def _ignored(error: "UnraisableHookArgs") -> None:
         again = threading.Timer(_SOON, _interrupt)
         again.daemon = True
         again.start()
-    elif issubclass(error.exc_type, MemoryError):
+    elif issubclass(error.exc_type, MemoryError) or was_short_of_memory():
         print("chipglow: not enough memory for a part of the page", file=sys.stderr)
     elif getattr(error.object, "__name__", "") != "__del__":
         sys.__unraisablehook__(error)

@@ -9,6 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from chipglow.cli import options as opt, screen, streams
+from chipglow.cli.shortage import was_short_of_memory
 
 BAD_INPUT: Final = 2
 """Exit status after invalid input; Click uses the same."""
@@ -23,14 +24,8 @@ _LONGEST_MESSAGE: Final = 2000
 """Characters of an error that are shown; a longer one quotes a value of the input."""
 
 _NO_THREAD: Final = "can't start new thread"
-_NO_ROOM: Final = "failed to map segment"
-"""Message of the system if a limit of memory leaves no room for a library."""
-
-_OUT_OF_MEMORY: Final = "out of memory"
-"""End of a message of FreeType, which draws texts."""
-
-_NO_EXCEPTION: Final = "without exception set", "without setting an exception"
-"""Messages of Python if its own code failed for lack of memory, and had none to say so."""
+_RESERVE: Final = 2**20
+"""Bytes kept for the line that says that memory is missing."""
 
 _FEWER: Final = "end other programs, raise the limit (ulimit -u), or set OMP_NUM_THREADS=1"
 _SMALLER: Final = "choose fewer or coarser samples, or end other programs"
@@ -50,11 +45,18 @@ class Boundary(TyperGroup):
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run a command; what it could not print is an error at the end."""
+        reserve = bytearray(_RESERVE)
         try:
             return super().main(*args, **kwargs)
+        except Exception as error:
+            del reserve
+            if (message := _failure(error)) is None:
+                raise
+            print(f"chipglow: {message}", file=sys.stderr)
+            sys.exit(FAILED)
         finally:
-            if error := streams.failure():
-                print(f"chipglow: standard output: {error.strerror}", file=sys.stderr)
+            if unwritten := streams.failure():
+                print(f"chipglow: standard output: {unwritten.strerror}", file=sys.stderr)
                 sys.exit(FAILED)
 
     def invoke(self, ctx: Any) -> Any:
@@ -70,6 +72,9 @@ class Boundary(TyperGroup):
             message = error.message.removeprefix("Value error, ")
             raise _ended(f"{error.param.opts[0]}: {message}", BAD_INPUT) from None
         except (ValueError, OSError) as error:
+            # The system states a number, a library that could not be loaded does not.
+            if getattr(error, "errno", 0) is None and was_short_of_memory():
+                raise
             raise _ended(_one_line(error), BAD_INPUT) from None
         except OverflowError as error:
             raise _ended(f"a number is too large: {_one_line(error)}", BAD_INPUT) from None
@@ -80,31 +85,23 @@ class Boundary(TyperGroup):
                 f"{error}: --resume continues from there" if str(error) else "nothing was written"
             )
             raise _ended(f"interrupted, {kept}", INTERRUPTED) from None
-        except MemoryError as error:
-            raise _ended(
-                ": ".join(filter(None, ("not enough memory", _one_line(error)))) + f"; {_SMALLER}",
-                FAILED,
-            ) from None
-        except ImportError as error:
-            if _NO_ROOM not in str(error):
-                raise
-            raise _ended(f"not enough memory to load a library; {_SMALLER}", FAILED) from None
-        except SystemError as error:
-            if not str(error).endswith(_NO_EXCEPTION):
-                raise
-            raise _ended(f"probably not enough memory ({error}); {_SMALLER}", FAILED) from None
-        except RuntimeError as error:
-            from chipglow.cutting import SolverError
 
-            if str(error) == _NO_THREAD:
-                raise _ended(
-                    f"the system starts no more threads or processes; {_FEWER}", FAILED
-                ) from None
-            if str(error).endswith(_OUT_OF_MEMORY):
-                raise _ended(f"not enough memory: {_one_line(error)}; {_SMALLER}", FAILED) from None
-            if not isinstance(error, SolverError):
-                raise
-            raise _ended(_one_line(error), FAILED) from None
+
+def _failure(error: Exception) -> str | None:
+    """Return what to print for an error that is no refusal; None if nothing explains it."""
+    if isinstance(error, MemoryError):
+        said = _one_line(error)
+        return f"not enough memory{': ' * bool(said)}{said}; {_SMALLER}"
+    # A command that simulates has imported the class; memory may be too short for an import.
+    cutting = sys.modules.get("chipglow.cutting")
+    if cutting and isinstance(error, cutting.SolverError):
+        return _one_line(error)
+    if was_short_of_memory():
+        said = f"{type(error).__name__}: {_one_line(error)}"
+        return f"probably not enough memory ({said}); {_SMALLER}"
+    if isinstance(error, RuntimeError) and str(error) == _NO_THREAD:
+        return f"the system starts no more threads or processes; {_FEWER}"
+    return None
 
 
 def _ended(message: str, code: int) -> typer.Exit:
