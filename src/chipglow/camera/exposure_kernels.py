@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from chipglow.quantities import Array
 from chipglow.quantities.units import COLDEST
 from chipglow.scene import Frame, Material
+from chipglow.scene.kernels import INNER
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, TOOL_SPLINE, SplineFrame, spread
 from chipglow.surface import EmissivityStack, Features
 from chipglow.surface.blend import SCRATCH, blend_row, in_blocks
@@ -45,6 +46,7 @@ Check: TypeAlias = Callable[[], None]
 """Called periodically during an exposure; an exception that it raises aborts the exposure."""
 
 _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
+_INNER: Final = {**_FAST, **INNER}
 
 
 class Sums:
@@ -145,7 +147,7 @@ def _batch(frames: Sequence[Frame], name: str) -> tuple[NDArray[Any], ...]:
     return _filled([np.ascontiguousarray(one) for one in values])
 
 
-@njit(**_FAST)
+@njit(**_INNER)
 def _find(temperature, last, number, past):
     """Compute the table index below each temperature, and the remaining fraction or NaN."""
     for i in range(temperature.size):
@@ -157,14 +159,14 @@ def _find(temperature, last, number, past):
         past[i] = inside - np.float32(number[i]) if off == np.float32(0.0) else np.float32(np.nan)
 
 
-@njit(**_FAST)
+@njit(**_INNER)
 def _look_up(table, number, past, black):
     for i in range(black.size):
         k = np.uint32(number[i])
         black[i] = table[k, 0] + past[i] * table[k, 1]
 
 
-@njit(**_FAST)
+@njit(**_INNER)
 def _add_temperature(temperature, kind, weight, hottest, heat, present):
     for i in range(hottest.size):
         is_material = kind[i] != _VOID
@@ -174,7 +176,7 @@ def _add_temperature(temperature, kind, weight, hottest, heat, present):
         present[i] += weight * is_material
 
 
-@njit(**_FAST)
+@njit(**_INNER)
 def _apparent(emissivity, black, kind, environment, max_emissivity, apparent):
     for i in range(apparent.size):
         e = emissivity[i]
@@ -183,19 +185,26 @@ def _apparent(emissivity, black, kind, environment, max_emissivity, apparent):
         apparent[i] = radiance if kind[i] != _VOID else np.float32(0.0)
 
 
-@njit(**_FAST)
+@njit(**_INNER)
 def _sum(apparent, weight, mean):
     for i in range(mean.size):
         mean[i] += weight * np.float64(apparent[i])
 
 
-@njit(**_FAST)
+@njit(**_INNER)
 def _raise_peak(apparent, peak):
     for i in range(peak.size):
         peak[i] = max(peak[i], apparent[i])
 
 
-@njit(**_FAST)
+@njit(**_INNER)
+def _copy(source, target):
+    """Copy without a check of shapes, which takes longer to compile than all else here."""
+    for i in range(target.size):
+        target[i] = source[i]
+
+
+@njit(**_INNER)
 def _add_row(temperature, kind, emissivity, weight, is_middle, row, work, number, sums):
     """Add row `row` of a sub-frame, with the emissivities (surface, x), to the sums."""
     (
@@ -218,7 +227,7 @@ def _add_row(temperature, kind, emissivity, weight, is_middle, row, work, number
         _sum(apparent, weight, mean[n, row])
         _raise_peak(apparent, peak[n, row])
         if is_middle:
-            centre[n, row, :] = apparent
+            _copy(apparent, centre[n, row])
 
 
 @njit(cache=True, **_FAST)
@@ -259,27 +268,27 @@ def _add_features(fields, shifts, textures, weights, middles, first, last, sums)
             )  # fmt: skip
 
 
-@njit(**_FAST)
+@njit(**_INNER)
 def _combine(wide, base, u, v, w, result):
     upper, middle, lower = wide[base], wide[base + 1], wide[base + 2]
     for i in range(result.size):
         result[i] = u * upper[i] + v * middle[i] + w * lower[i]
 
 
-@njit(**_FAST)
+@njit(**_INNER)
 def _classify(filled, in_tool, kind):
     for i in range(kind.size):
         outside = np.uint8(_WORKPIECE) if filled[i] > np.float32(0.5) else np.uint8(_VOID)
         kind[i] = np.uint8(_TOOL) if in_tool[i] else outside
 
 
-@njit(**_FAST)
+@njit(**_INNER)
 def _limit(values, lower, upper):
     for i in range(values.size):
         values[i] = min(max(values[i], lower), upper)
 
 
-@njit(**_FAST)
+@njit(**_INNER)
 def _set_tool(tool, kind, temperature):
     for i in range(kind.size):
         temperature[i] = tool[i] if kind[i] == _TOOL else temperature[i]
@@ -319,8 +328,8 @@ def _add_splines(nodes, limits, grid, fixed, shifts, textures, weights, middles,
                 _combine(wide[TOOL_SPLINE], base, u, v, w, values[TOOL_SPLINE])
                 _set_tool(values[TOOL_SPLINE], kind, values[0])
             if fixed[0].size > 0:
-                values[_X, :] = fixed[0][row]
-                values[_Y, :] = fixed[1][row]
+                _copy(fixed[0][row], values[_X])
+                _copy(fixed[1][row], values[_Y])
             blend_row(
                 kind, values[_STRAIN], values[_RATE], values[_X], values[_Y], shifts[k],
                 textures, row, scratch, corner, emissivity,

@@ -8,7 +8,7 @@ sums on the grid are made in the same order whatever the number of threads.
 """
 
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -29,6 +29,7 @@ from chipglow.cutting.stress import (
     kelvin_index,
     update_stresses,
 )
+from chipglow.scene.kernels import INNER
 from chipglow.scene.tool_surface import surface_bound, surface_distance
 
 BLOCK_COLUMNS = 6
@@ -94,27 +95,27 @@ class Step(NamedTuple):
     viscosity: float = 0.0
 
 
-@njit(**INLINE)
+@njit(**INLINE, **INNER)
 def spline(position):  # type: ignore[no-untyped-def]
     """Return the first of three nodes of a quadratic B-spline and the offset from it in cells."""
     first = int(position - 0.5)
     return first, position - first
 
 
-@njit(**INLINE)
+@njit(**INLINE, **INNER)
 def spline_weights(offset):  # type: ignore[no-untyped-def]
     """Return the weights of the three nodes."""
     # 3/4 − x² for |x| < 1/2 and (3/2 − |x|)²/2 beyond
     return 0.5 * (1.5 - offset) ** 2, 0.75 - (offset - 1.0) ** 2, 0.5 * (offset - 0.5) ** 2
 
 
-@njit(**INLINE)
+@njit(**INLINE, **INNER)
 def _distances(offset):  # type: ignore[no-untyped-def]
     """Return the distances of the three nodes from the position, in cells."""
     return -offset, 1.0 - offset, 2.0 - offset
 
 
-@njit(**INLINE)
+@njit(**INLINE, **INNER)
 def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
     """Take velocity and its gradient from the grid; move the point. True if it is on the grid."""
     inverse = 1.0 / grid.cell
@@ -138,7 +139,7 @@ def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(**INLINE)
+@njit(**INLINE, **INNER)
 def _scatter(p, soft, tension, fx, fy, limit, nodes, grid, step):  # type: ignore[no-untyped-def]
     """Give mass, momentum, stress and contact impulse to the grid. True if it is on it."""
     inverse = 1.0 / grid.cell
@@ -170,7 +171,7 @@ def friction_coefficient(coefficient, exponent, melting_temperature, temperature
     return coefficient * max(1.0 - (temperature / melting_temperature) ** exponent, 0.0)
 
 
-@njit(**FAST)
+@njit(**FAST, **INNER)
 def _contact(p, stress, tool, step, law):  # type: ignore[no-untyped-def]
     """Return the force of the tool on a point (N/m) and the limit of its friction impulse."""
     distance, nx, ny = surface_distance(p.x, p.y, tool)
@@ -191,7 +192,7 @@ def _contact(p, stress, tool, step, law):  # type: ignore[no-untyped-def]
     return push * nx, push * ny, limit
 
 
-@njit(**FAST)
+@njit(**FAST, **INNER)
 def _gather_cells(points, starts, first, last, velocity, grid, step, elastic, sums):  # type: ignore[no-untyped-def]
     """Move the points of some cells; False if one left the grid."""
     on_grid = True
@@ -219,7 +220,7 @@ def _gather_cells(points, starts, first, last, velocity, grid, step, elastic, su
     return on_grid
 
 
-@njit(**FAST)
+@njit(**FAST, **INNER)
 def _work_block(  # type: ignore[no-untyped-def]
     points, starts, block, velocity, nodes, tool, grid, step, law, damage, elastic, capacity,
     heat_fractions, sums, buffer,
@@ -254,7 +255,7 @@ def _work_block(  # type: ignore[no-untyped-def]
     return on_grid
 
 
-@njit(**FAST)
+@njit(**FAST, **INNER)
 def _work_column(i, velocity, nodes, heat, tool, grid, step, sums):  # type: ignore[no-untyped-def]
     """Set new velocities of a column of nodes: driven boundary and friction; reset its sums."""
     x = grid.left + i * grid.cell
@@ -288,6 +289,15 @@ def _work_column(i, velocity, nodes, heat, tool, grid, step, sums):  # type: ign
         velocity[i, j, CHANGE_X], velocity[i, j, CHANGE_Y] = vx - ux, vy - uy
 
 
+_PARALLEL: Final[Any] = {
+    "parallel": dict.fromkeys(
+        ("comprehension", "reduction", "inplace_binop", "setitem", "numpy", "stencil", "fusion"),
+        False,
+    )
+}
+"""Only loops over `prange` are parallel: others are short, and take as long to compile."""
+
+
 def _advance(  # type: ignore[no-untyped-def]
     steps, points, starts, velocity, nodes, heat, tool, grid, step, law, damage, elastic,
     capacity, heat_fractions, sums, threads,
@@ -318,11 +328,12 @@ def _advance(  # type: ignore[no-untyped-def]
                 _work_column(i, velocity, nodes, heat, tool, grid, step, of_columns)
         if not good.all():
             return False
-    sums += of_blocks.sum(axis=0) + of_columns.sum(axis=0)
+    for i in range(sums.size):  # a sum along an axis takes seconds to compile
+        sums[i] += of_blocks[:, i].sum() + of_columns[:, i].sum()
     return True
 
 
-advance = njit(cache=True, parallel=True)(_advance)
+advance = njit(cache=True, **_PARALLEL)(_advance)
 
 
 def advance_with(law: Any) -> Any:
@@ -334,4 +345,4 @@ def advance_with(law: Any) -> Any:
     return advance if comes_with_chipglow(type(law)) else _advance_afresh
 
 
-_advance_afresh = njit(parallel=True)(_advance)
+_advance_afresh = njit(**_PARALLEL)(_advance)

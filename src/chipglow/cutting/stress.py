@@ -14,6 +14,7 @@ from chipglow.cutting.damage import damage_growth, weakening
 from chipglow.cutting.flow_stress import stress_and_slopes
 from chipglow.cutting.lanes import FAST, INLINE, exponential
 from chipglow.cutting.material import TABLE_COLDEST
+from chipglow.scene.kernels import INNER
 
 LANES = 128
 """Points of a batch: their rows stay in the fastest cache."""
@@ -93,7 +94,7 @@ def plastic_increments(b, count, shear_modulus, time_step, viscosity, law, damag
     return True
 
 
-@njit(**FAST)
+@njit(**FAST, **INNER)
 def _improve(b, count, shear_modulus, time_step, viscosity, law, damage):  # type: ignore[no-untyped-def]
     """Do a step of Newton over the logarithm of the increment; return how many change much."""
     slowest = SLOWEST_RATE * time_step
@@ -122,7 +123,7 @@ def _improve(b, count, shear_modulus, time_step, viscosity, law, damage):  # typ
     return far
 
 
-@njit(**FAST)
+@njit(**FAST, **INNER)
 def _try(b, count, step):  # type: ignore[no-untyped-def]
     """Compute the trial deviator (Jaumann rate), its equivalent stress, and mean stress."""
     time_step = step.time_step
@@ -147,7 +148,7 @@ def _try(b, count, step):  # type: ignore[no-untyped-def]
         b[WORK + k] = 0.0
 
 
-@njit(**FAST)
+@njit(**FAST, **INNER)
 def _return(b, count, step, law, damage):  # type: ignore[no-untyped-def]
     """Bring the deviator back to the flow stress; strain, damage, and plastic work (J/m)."""
     per_step = 1.0 / step.time_step
@@ -184,7 +185,7 @@ def elastic_energy(p, shear, bulk, step):  # type: ignore[no-untyped-def]
     return sheared, pressed
 
 
-@njit(**INLINE)
+@njit(**INLINE, **INNER)
 def _moduli_loss(p, warm, elastic, step):  # type: ignore[no-untyped-def]
     """Return the elastic energy (J/m) that a point lost since its last step, as its moduli fell.
 
@@ -199,7 +200,7 @@ def _moduli_loss(p, warm, elastic, step):  # type: ignore[no-untyped-def]
     return sheared + pressed
 
 
-@njit(**FAST)
+@njit(**FAST, **INNER)
 def update_stresses(  # type: ignore[no-untyped-def]
     points, begin, end, step, law, damage, elastic, capacity, heat_fractions, b
 ):
@@ -263,7 +264,7 @@ def property_at(table, temperature):  # type: ignore[no-untyped-def]
     return table[kelvin_index(temperature, table.size)]
 
 
-@njit(**INLINE)
+@njit(**INLINE, **INNER)
 def kelvin_index(temperature, size):  # type: ignore[no-untyped-def]
     """Return the row of a temperature in a table of `size` rows, one for each kelvin from 200 K."""
     return min(max(int(temperature - TABLE_COLDEST), 0), size - 1)

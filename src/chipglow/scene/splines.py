@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from chipglow.scene.frame import Frame, Material
+from chipglow.scene.kernels import INNER
 from chipglow.scene.raster import Raster, check_shape
 
 SPLINE_FIELDS: Final = (
@@ -176,7 +177,7 @@ def _placement(position: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArra
     return first.astype(np.int64), weights.astype(np.float32)
 
 
-@njit(**_FAST)
+@njit(**_FAST, **INNER)
 def spread(nodes, first, weights, begin, end, result):  # type: ignore[no-untyped-def]
     """Return a row of nodes on the columns of samples from `begin` to `end`."""
     for c in range(begin, end):

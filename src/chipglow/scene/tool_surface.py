@@ -7,6 +7,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from chipglow.scene.kernels import INNER
+
 FACE_LENGTH: Final = 0.1
 """Length in m to which kernels draw the straight faces of a chain: far beyond any cut."""
 
@@ -92,7 +94,7 @@ def surface_bound(x, y, tool):  # type: ignore[no-untyped-def]
     return max(rake, clearance) - tool.radius
 
 
-@njit
+@njit(**INNER)
 def _wedge_distance(x, y, tool):  # type: ignore[no-untyped-def]
     px, py = x - tool.x, y - tool.y
     if (
@@ -110,7 +112,7 @@ def _wedge_distance(x, y, tool):  # type: ignore[no-untyped-def]
     return clearance - tool.radius, tool.clearance_y, -tool.clearance_x
 
 
-@njit
+@njit(**INNER)
 def _chain_distance(x, y, tool):  # type: ignore[no-untyped-def]
     """Distance to the nearest piece; stretches that are farther than a known corner are skipped."""
     chain, stride = tool.chain, tool.stride
@@ -138,7 +140,7 @@ def _chain_distance(x, y, tool):  # type: ignore[no-untyped-def]
     return _side(x, y, tool, piece, place)
 
 
-@njit
+@njit(**INNER)
 def _side(x, y, tool, piece, place):  # type: ignore[no-untyped-def]
     """Signed distance and normal, from the nearest piece and the place on it."""
     chain = tool.chain

@@ -13,6 +13,7 @@ from numba import get_num_threads, njit
 from numpy.typing import NDArray
 
 from chipglow.scene import Material
+from chipglow.scene.kernels import INNER
 from chipglow.surface.texture import PADDED_SIZE, WRAP, emissivity_at, patch
 
 STRAIN_OF_WORKPIECE: Final = 0.3
@@ -28,7 +29,7 @@ SCRATCH: Final = 5
 """Rows of float32 that `blend_row` works on, before those of the seeds."""
 
 _WORKPIECE, _TOOL = int(Material.WORKPIECE), int(Material.TOOL)
-_FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
+_FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True, **INNER}
 
 
 class Textures(NamedTuple):

@@ -14,6 +14,7 @@ from scipy.ndimage import correlate1d
 from scipy.special import betainccinv, betaincinv, ndtr
 
 from chipglow.quantities import Array, Parameter, Part, zero_to_one
+from chipglow.scene.kernels import INNER
 
 REACH: Final = 8.0
 """Normal deviates are limited to −8 to 8."""
@@ -201,7 +202,7 @@ def patch(typing, nodes, corner, across, down):  # type: ignore[no-untyped-def]
     return types.float32(nodes, types.int64, types.float32, types.float32), generate
 
 
-@njit(**_FAST)
+@njit(**_FAST, **INNER)
 def emissivity_at(deviate, table):  # type: ignore[no-untyped-def]
     """Return the emissivity at a normal deviate, linear between the entries of its table."""
     position = (deviate + np.float32(REACH)) * np.float32(STEPS)
