@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -24,10 +25,10 @@ def packages():
     return [name for cell in firsts for name in re.findall(r"`(\w+)`", cell)]
 
 
-def imported(tree, module, is_package, known):
-    """The modules of the package that a tree imports, lazy imports and stubs included."""
+def imported(nodes, module, is_package, known):
+    """The modules of the package that nodes of a tree import, lazy ones and stubs included."""
     here = module if is_package else module.rpartition(".")[0]
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Import):
             yield from (one.name for one in node.names if one.name in known)
         elif isinstance(node, ast.ImportFrom):
@@ -37,15 +38,20 @@ def imported(tree, module, is_package, known):
                 yield from found[:1]
 
 
-def without_types(tree):
-    """The tree without the imports that only type checkers see."""
+def walked(tree, with_types):
+    """The nodes of a tree, with or without what only type checkers see."""
+    todo = [tree]
+    while todo:
+        node = todo.pop()
+        tested = isinstance(node, ast.If) and getattr(node.test, "id", "")
+        if with_types or tested != "TYPE_CHECKING":
+            yield node
+            todo.extend(ast.iter_child_nodes(node))
 
-    class Pruned(ast.NodeTransformer):
-        def visit_If(self, node):
-            is_for_types = isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
-            return None if is_for_types else self.generic_visit(node)
 
-    return Pruned().visit(tree)
+@cache
+def parsed(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def graph(with_types):
@@ -56,9 +62,8 @@ def graph(with_types):
     for path in files:
         module = module_name(path)
         if module in edges:
-            tree = ast.parse(path.read_text(encoding="utf-8"))
-            tree = tree if with_types else without_types(tree)
-            edges[module] |= set(imported(tree, module, path.stem == "__init__", known))
+            nodes = walked(parsed(path), with_types)
+            edges[module] |= set(imported(nodes, module, path.stem == "__init__", known))
     return edges
 
 
