@@ -622,10 +622,10 @@ def _declared(
     studies = [study, *(changed(study, word.changes) for word in words)]
     rows = {}
     for row in table:
-        declared = [setting_at(one, row.path) for one in studies if _has(one, row.path)]
-        if declared:
+        first = next((one for one in studies if _has(one, row.path)), None)
+        if first is not None:
             own, of_row = ranges.get(row.path, {}), options.get(row.path, {})
-            quantity = declared[0].parameter.quantity
+            quantity = setting_at(first, row.path).parameter.quantity
             rows[row.path] = replace(row, quantity=quantity, options=of_row, **own)
     return rows
 
