@@ -1,6 +1,7 @@
 """Shared by the tests: profiles of Hypothesis, the quick study, the registry of flow laws."""
 
 import os
+import pickle
 import subprocess
 import sys
 import time
@@ -171,18 +172,23 @@ def own_laws():
 
 
 @pytest.fixture(scope="session")
-def chip_analysis():
+def chip_analysis(shared_folder):
     """The paper's camera on the analytic chip: eight draws in one segment."""
+    return pickle.loads((shared_folder("chip-analysis", analyse_chip) / "analysis").read_bytes())
+
+
+def analyse_chip(folder):
     from analytic_chip import AnalyticChip
 
     from chipglow.analysis import AttributionPlan, Plan, analyse
     from chipglow.camera import Camera
     from chipglow.surface import CHIP_1, CHIP_2
 
-    return analyse(
+    analysis = analyse(
         AnalyticChip(frames=60).scene(),
         {"chip 1": CHIP_1, "chip 2": CHIP_2},
         Camera.paper(),
         Plan(exposures=3, phases=2, textures=3, psf_widths=(4e-6, 12e-6, 20e-6)),
         attribution=AttributionPlan(),
     )
+    (folder / "analysis").write_bytes(pickle.dumps(analysis))
