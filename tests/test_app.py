@@ -23,7 +23,7 @@ from chipglow.app.opening import open_any, open_uploaded, scene_model
 from chipglow.app.session import Newest, Session, SupersededError
 from chipglow.app.view import PageView
 from chipglow.camera.reference import reference_temperature
-from chipglow.io import example_scene, is_measurement
+from chipglow.io import example_scene, file_kind
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.quantities.format import readable
 from chipglow.scene import sample
@@ -447,7 +447,7 @@ def test_what_is_saved_can_be_opened(model, tmp_path, reference):
     picture, label = model.picture(state), REFERENCES[reference].lower()
     file = tmp_path / "measurement.nc"
     file.write_bytes(measurement_file(picture, model))
-    assert is_measurement(file)
+    assert file_kind(file) == "measurement"
     again = open_uploaded(file, "mine.nc")
     assert again.name == "mine.nc"
     seen = again.picture(again.controls.initial)

@@ -2,11 +2,13 @@
 
 import os
 from dataclasses import replace
+from threading import Event
 from types import SimpleNamespace
 
 import camera_files
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
 import tifffile
 import xarray as xr
@@ -15,7 +17,7 @@ from hot_frames import hot_frames
 from scipy.ndimage import binary_dilation
 from synthetic_edge import edge_radiance, gaussian_edge, image_of
 
-from chipglow.app.asking import contents_of, settings_of
+from chipglow.app.asking import settings_of
 from chipglow.app.controls import CORRECTION_IMAGES
 from chipglow.app.marks import Mark
 from chipglow.app.opening import Asking, OpenFiles, open_any
@@ -34,7 +36,7 @@ from chipglow.quantities import ZERO_CELSIUS
 
 pytest.importorskip("panel", reason="needs the extra app")
 import panel as pn
-from app_page import shown
+from app_page import PATIENCE, shown, until
 
 from chipglow.app.asking_page import AskingPage
 from chipglow.app.view import PageView
@@ -178,15 +180,6 @@ def test_the_settings_are_saved_beside_the_file_for_the_app_and_the_command(requ
         np.testing.assert_array_equal(again.kelvins(2), expected.radiance_temperature()[2])
 
 
-def test_the_content_follows_from_the_file(ptw, tiff, tmp_path):
-    (tmp_path / "mesh.vtu").write_text("<VTKFile/>")
-    np.savez(tmp_path / "grid.npz", temperature=np.full((2, 8, 9), 300.0))
-    (tmp_path / "letter.doc").write_text("Dear reader")
-    names = {"run.ptw": ("measurement",), "run.tif": ("measurement",), "mesh.vtu": ("scene",)}
-    names |= {"grid.npz": ("measurement", "scene"), "letter.doc": ()}
-    assert {name: contents_of(tmp_path / name) for name in names} == names
-
-
 def test_fields_of_another_program_become_a_scene(tmp_path, files):
     y, x = np.mgrid[:30, :40]
     path = tmp_path / "grid.npz"
@@ -203,27 +196,14 @@ def test_fields_of_another_program_become_a_scene(tmp_path, files):
 
 def test_a_dropped_file_is_asked_for_and_removed_at_the_end(ptw, files):
     path, settings = ptw
-    key = files.add("C:/run.ptw", path.read_bytes())
+    key = files.add(files.store("C:/run.ptw", path.read_bytes()))
     assert isinstance(files.find(key), Asking) and files.find(key).name == "run.ptw"
     assert files.answer(key, "measurement", settings).name == "run.ptw"
     assert files.find(key).raster.shape == (40, 60)
     with pytest.raises(ValueError, match=r"^holiday\.nc: "):
-        files.add("holiday.nc", b"no scene" * 100)
+        files.add(files.store("holiday.nc", b"no scene" * 100))
     files.close()
     assert not files.folder.exists()
-
-
-def test_what_another_command_wrote_is_named_and_not_asked_for(ptw, tmp_path):
-    path, settings = ptw
-    (tmp_path / "places.yaml").write_text("regions: {body: {rectangle: [[20, 10], [40, 30]]}}\n")
-    stated = [word for name, text in settings.items() for word in ("--set", f"{name}={text}")]
-    known = ["--regions", tmp_path / "places.yaml", "--reference", "900 degC"]
-    run("emissivity", path, *stated, *known, "--out", tmp_path / "emissivity.nc")
-    edge = image_of(edge_radiance(gaussian_edge(10e-6), 5.0, 40), 0.05, 0, None, "edge")
-    write_psf(knife_edge([edge]), tmp_path / "psf.nc")
-    for name, content in (("emissivity", "emissivity map"), ("psf", "point spread function")):
-        with pytest.raises(ValueError, match=rf"{name}\.nc: is an? {content}, not an image"):
-            open_any(tmp_path / f"{name}.nc")
 
 
 def test_the_name_of_a_file_is_no_link(tiff, files):
@@ -385,6 +365,107 @@ def test_the_page_corrects_as_the_command_does_with_its_session(small, stated):
     again.end()
 
 
+def by_file(small, files):
+    """A page with a file of emissivities of two boxes, which was dropped on it, and the boxes."""
+    run("emissivity", "chip.nc", "--regions", "heated.yaml", *HEATED, "--out", "emissivity.nc")
+    view = shown(small / "chip.nc", files)
+    view._open(("emissivity.nc", (small / "emissivity.nc").read_bytes()))
+    for number, corners in enumerate((((200e-6, 170e-6), (240e-6, 200e-6)), BOX)):
+        view.measuring._add("box", corners)
+        if number == 1:
+            edit = SimpleNamespace(row=1, column="place", value="middle")
+            view.measuring._on_edit(edit)
+    return view
+
+
+HEATED = ["--reference", "900 degC", "--reference-uncertainty", "9 K"]
+
+
+def test_a_dropped_emissivity_file_gives_the_temperatures_of_the_commands(small, files):
+    (small / "heated.yaml").write_text(
+        "regions:\n"
+        "  middle: {rectangle: [[240 um, 190 um], [276 um, 228 um]]}\n"
+        "  side: {rectangle: [[204 um, 190 um], [234 um, 222 um]], feature: chip body}\n"
+    )
+    view, read = by_file(small, files), Event()
+    measuring, session = view.measuring, view.session
+    model, texts = session.model, {"camera.psf": "file", "psf_file": "psf.nc"}
+    view.opened.watch(lambda: view.opened.corrected is None or read.set())  # after the table
+    session.change(texts | {"corrected_part": "whole"})
+    (zone,) = model.zones(session.state.study)
+    assert (zone.name, model.needs(session.state)) == ("middle", "")
+    assert read.wait(PATIENCE)
+    picture, table = view._picture, measuring._table.set_index("place")
+    (small / "session.yaml").write_text(text := measuring._session_text())
+    view.end()
+    assert "emissivity_file: emissivity.nc\n" in text  # beside the session
+    run("correct", "chip.nc", "--regions", "session.yaml", "--out", "corrected.nc")
+    expected = read_correction("corrected.nc")
+    found = picture.corrected.correction
+    for name in ("temperature", "standard_uncertainty"):
+        # The file has 32 bits; lengths are texts of many digits in a session.
+        np.testing.assert_allclose(found.data[name], expected.data[name], rtol=1e-6)
+    mean = expected.at(zone)
+    assert table.true_temperature_degC["middle"] == pytest.approx(
+        float(mean.values) - ZERO_CELSIUS, rel=1e-6
+    )
+    assert table.expanded_uncertainty_K["middle"] == pytest.approx(
+        float(mean.expanded_uncertainty()), rel=1e-6
+    )
+    assert np.isnan(table.true_temperature_degC["box 1"])
+    again = shown(small / "session.yaml")
+    lines = again.session.model.controls.emissivities(again.session.state.study).lines
+    assert list(lines) == ["middle", "side"]
+    again.end()
+
+
+def test_the_table_has_the_emissivity_of_a_file_until_the_user_states_another(small, files):
+    (small / "heated.yaml").write_text(
+        "regions: {middle: {rectangle: [[240 um, 190 um], [276 um, 228 um]]}}\n"
+    )
+    view = by_file(small, files)
+    measuring = view.measuring
+    until(lambda: np.isfinite(measuring._table.true_temperature_degC[1]))
+    (small / "session.yaml").write_text(measuring._session_text())
+    run("temperature", "chip.nc", "--regions", "session.yaml", "--table", "table.csv")
+    table = pd.read_csv("table.csv").set_index("region").loc["middle"]
+    shown_row = measuring._rows.value.set_index("place").loc["middle"]
+    # The table of the command has nine digits.
+    for name, value in (
+        ("emissivity", table.emissivity),
+        ("true_temperature_degC", table.true_temperature_K - ZERO_CELSIUS),
+        ("expanded_uncertainty_K", table.expanded_uncertainty_K),
+    ):
+        assert shown_row[name] == pytest.approx(value, rel=1e-7)
+    measuring._on_edit(SimpleNamespace(row=1, column="emissivity", value=0.5))
+    row = measuring._rows.value.set_index("place").loc["middle"]
+    assert (row.emissivity, row.uncertainty) == (0.5, 0.0)
+    measuring._on_edit(SimpleNamespace(row=1, column="emissivity", value=None))
+    assert measuring._rows.value.emissivity[1] == shown_row.emissivity
+    view.end()
+
+
+def test_the_page_says_which_names_an_emissivity_file_has(small, files):
+    (small / "heated.yaml").write_text(
+        "regions: {side: {rectangle: [[204 um, 190 um], [234 um, 222 um]]}}\n"
+    )
+    view = by_file(small, files)
+    assert view.session.state.study.emissivity_file.endswith("/emissivity.nc")
+    needs = "the emissivity or a region with a name of its file (side)"
+    assert view.session.model.needs(view.session.state).startswith(needs)
+    view._open(("psf.nc", knife_file(small)))
+    assert view.session.state.study.psf_source == "file"
+    assert view.session.model.needs(view.session.state) == needs
+    view.end()
+
+
+def knife_file(folder):
+    """The content of a file of chipglow psf."""
+    edge = image_of(edge_radiance(gaussian_edge(10e-6), 5.0, 40), 0.05, 0, None, "edge")
+    write_psf(knife_edge([edge]), folder / "knife.nc")
+    return (folder / "knife.nc").read_bytes()
+
+
 def test_a_region_has_its_own_emissivity_in_the_correction(small):
     model = open_any(small / "chip.nc")
     region = Mark("box 1", "box", BOX).within(model.raster).region
@@ -408,6 +489,8 @@ def test_files_of_a_correction_are_checked_when_they_are_named(small):
     for texts, message in (
         ({"psf_file": "none.nc"}, r"^PSF file: /.*none\.nc: there is no such file"),
         ({"psf_file": "chip.nc"}, r"^PSF file: .*chip\.nc"),
+        ({"emissivity_file": "none.nc"}, r"^Emissivity file: none\.nc: there is no such file"),
+        ({"emissivity_file": "psf.nc"}, r"^Emissivity file: psf\.nc: not an emissivity map"),
         ({"tool": "no.yaml"}, r"^Tool: .*no\.yaml.*rake_angle"),
     ):
         with pytest.raises(ValueError, match=message) as refused:

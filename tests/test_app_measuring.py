@@ -1,6 +1,5 @@
 """Places that are drawn in the app, without a browser: their numbers, files and limits."""
 
-import time
 from dataclasses import replace
 from io import BytesIO
 
@@ -21,7 +20,7 @@ from chipglow.laboratory.emissivity.places import KnownEmissivity
 from chipglow.laboratory.readings import place_curves, read_places
 
 pytest.importorskip("panel", reason="needs the extra app")
-from app_page import PATIENCE, shown
+from app_page import shown, until
 
 BOX = ((150e-6, 150e-6), (300e-6, 240e-6))
 SHAPES = {
@@ -31,13 +30,6 @@ SHAPES = {
     "circle": ((240e-6, 200e-6), (260e-6, 200e-6)),
     "polygon": ((100e-6, 100e-6), (300e-6, 120e-6), (200e-6, 260e-6)),
 }
-
-
-def until(is_true):
-    end = time.monotonic() + PATIENCE
-    while not is_true():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 @pytest.fixture(scope="module")

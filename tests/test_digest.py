@@ -12,8 +12,8 @@ from test_io import a_file, a_measurement_file
 
 from chipglow.io import digest, open_scene, read_measurement
 from chipglow.io.digest import is_intact
+from chipglow.io.file_kind import file_kind
 from chipglow.io.packing import COMPRESSION, chunk_of, read_chunk
-from chipglow.io.scene_file import is_scene
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.grids.arrays import open_arrays
 
@@ -54,7 +54,7 @@ def test_every_flipped_bit_is_found(tmp_path, write):
     ("write", "read", "name"),
     [
         *((a_file, open_scene, name) for name in ("plastic_strain", "x", "time", "force_time")),
-        (a_file, is_scene, "x"),
+        (a_file, file_kind, "x"),
         (a_measurement_file, read_measurement, "radiance"),
     ],
 )

@@ -25,7 +25,7 @@ from chipglow.camera import (
     Recording,
     SakumaHattori,
 )
-from chipglow.io import is_measurement, read_measurement, write_measurement, write_scene
+from chipglow.io import file_kind, read_measurement, write_measurement, write_scene
 from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import POINT_COLUMNS, read_bad_pixels, read_response, read_table
 from chipglow.laboratory.recordings import (
@@ -328,14 +328,13 @@ def test_a_response_takes_the_place_of_limits(tmp_path):
 def test_a_measurement_is_read_as_it_is(laboratory, tmp_path):
     measured = load_measurement("chip.yaml")
     write_measurement(measured, tmp_path / "measured.nc")
-    assert is_measurement(tmp_path / "measured.nc")
-    assert not is_measurement(laboratory / "chip.npy")
+    assert file_kind(tmp_path / "measured.nc") == "measurement"
     again = load_measurement(tmp_path / "measured.nc")
     np.testing.assert_array_equal(again.radiance, measured.radiance)
     with pytest.raises(ValueError, match="--set: 'pitch=6 um' describes nothing"):
         load_measurement(tmp_path / "measured.nc", ["pitch=6 um"])
     write_scene(AnalyticChip(frames=2).scene(), tmp_path / "scene.nc")
-    with pytest.raises(DescriptionError, match=r"scene\.nc: is a scene, .* measure creates one"):
+    with pytest.raises(ValueError, match=r"scene\.nc: is a scene, .* measure creates"):
         load_measurement(tmp_path / "scene.nc")
 
 

@@ -215,7 +215,7 @@ def test_what_is_wrong_is_one_line(path):
     (path.parent / "camera.fff").write_bytes(b"FFF\0" + bytes(5000))
     for arguments, parts in (
         (["scene.nc", "--at", "2 ms"], ("--at: 2000 us is not in the scene", "0 us to 100 us")),
-        (["camera.fff"], ("camera.fff: not a NetCDF-4 file", "chipglow convert inspects")),
+        (["camera.fff"], ("camera.fff: is a camera file", "chipglow convert creates")),
         (["none.nc"], ("none.nc: there is no such file",)),
         (["cut.nc"], ("cut.nc: not a NetCDF-4 file, or truncated",)),
     ):

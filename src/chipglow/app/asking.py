@@ -7,15 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias, get_args
 
-from h5py import is_hdf5
-
+from chipglow.io import FileKind
 from chipglow.io.cameras.binary import CutShortError
-from chipglow.io.cameras.formats import camera_formats, find_format
-from chipglow.io.import_file import IMPORT_SOURCES, ImportDescription, import_text, load_import
+from chipglow.io.import_file import ImportDescription, import_text, load_import
 from chipglow.io.importing import import_scene
 from chipglow.io.sandbox import ReaderProcess
-from chipglow.io.sources import SourceError
-from chipglow.io.sources.source import head_of
 from chipglow.laboratory.recordings import (
     CameraFrames,
     MeasurementDescription,
@@ -32,8 +28,13 @@ CONTENTS: Final[Mapping[Content, str]] = {
     "scene": "Computed or true fields (chipglow import)",
 }
 
-_ARRAYS: Final = ("netcdf", "hdf5", "mat", "npz", "zarr", "csv")
-"""Formats of arrays, which may be either."""
+ASKED: Final[Mapping[FileKind, tuple[Content, ...]]] = {
+    "camera": ("measurement",),
+    "program": ("scene",),
+    "import description": ("scene",),
+    "arrays": ("measurement", "scene"),
+}
+"""What files of others may contain, by their kinds."""
 
 _DESCRIPTIONS: Final[Mapping[Content, type[Part]]] = {
     "measurement": MeasurementDescription,
@@ -89,22 +90,6 @@ def described(path: Path) -> Path:
 def description_path(path: Path) -> Path:
     """Return the path of a file's description: beside it, with .yaml after the whole name."""
     return path.with_name(f"{path.name}.yaml")
-
-
-def contents_of(path: Path) -> tuple[Content, ...]:
-    """Return what a file of a camera or of another program may contain; nothing if unknown."""
-    try:
-        format = find_format(path)
-    except SourceError:
-        format = ""
-    if format in ("netcdf", "hdf5") and not (is_hdf5(path) or head_of(path, 3) == b"CDF"):
-        return ()
-    if format in _ARRAYS:
-        return ("measurement", "scene")
-    if format in camera_formats():
-        return ("measurement",)
-    endings = tuple(end for one in IMPORT_SOURCES.parts.values() for end in one.endings)
-    return ("scene",) if path.name.lower().endswith(endings) else ()
 
 
 def camera_frames(

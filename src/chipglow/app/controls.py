@@ -14,6 +14,7 @@ from chipglow.analysis import LinePlace
 from chipglow.camera import MeasuredPSFFile, PSFChoice
 from chipglow.camera.exposure import frame_weights
 from chipglow.io import load_tool
+from chipglow.laboratory.emissivity import StoredEmissivities
 from chipglow.laboratory.emissivity.places import FOUND
 from chipglow.quantities import Parameter, changed, setting_at, unchecked, value_at
 from chipglow.quantities.units import (
@@ -154,6 +155,9 @@ class ShownStudy(Study):
     emissivity: Annotated[
         float | None,
         Parameter("Emissivity of the measured object; none: not known.", over=0.0, most=1.0),
+    ] = None
+    emissivity_file: Annotated[
+        str | None, Parameter("Emissivities of places by name, output of chipglow emissivity.")
     ] = None
     edited: Annotated[str, Parameter("Camera that the controls change.")] = "first"
     set_emissivity: Annotated[
@@ -335,6 +339,13 @@ TABLE: Final = (
 _CORRECTED: Final = (
     Control("emissivity", "Emissivity", "Correction", 0.05),
     Control("emissivity_uncertainty", "Uncertainty (k = 1)", "Correction", 0.0, 0.1, 0.005),
+    Control(
+        "emissivity_file",
+        "Emissivity file",
+        "Correction",
+        is_text=True,
+        hint="file of chipglow emissivity",
+    ),
     Control("tool", "Tool", "Correction", is_text=True, hint="none, found, or a file"),
     Control("tool_emissivity", "Tool, emissivity", "Correction", 0.05),
     Control("tool_emissivity_uncertainty", "Tool, its u (k = 1)", "Correction", 0.0, 0.1, 0.005),
@@ -389,6 +400,10 @@ class Controls:
     scene: Scene | None = None
     has_tool: bool = False
     """Whether a measurement states its tool."""
+    _emissivities: dict[str, StoredEmissivities] = field(
+        init=False, default_factory=dict, repr=False
+    )
+    """Files that were named."""
 
     @classmethod
     def of_scene(cls, study: ShownStudy, scene: Scene, duration: float) -> "Controls":
@@ -501,7 +516,7 @@ class Controls:
         try:
             made = self.state({**state.texts, **texts})
             self._check(made)
-            _check_files(made.study, texts)
+            self._check_files(made.study, texts)
         except ValueError as error:
             message = str(error)
             for path in names.values():
@@ -567,16 +582,24 @@ class Controls:
         if state.second is not None:
             self._check(state.second)
 
+    def _check_files(self, study: ShownStudy, texts: Texts) -> None:
+        """Raise a ValueError if a file that was named now is not what it must be."""
+        try:
+            if "psf_file" in texts and study.psf_file is not None:
+                MeasuredPSFFile(study.psf_file)
+            if "emissivity_file" in texts and study.emissivity_file is not None:
+                file = study.emissivity_file
+                self._emissivities[file] = StoredEmissivities.read(file)
+            if "tool" in texts and study.tool not in (None, FOUND):
+                load_tool(str(study.tool))
+        except OSError as error:
+            is_of_system = error.filename is not None
+            message = f"{error.filename}: {error.strerror}" if is_of_system else str(error)
+            raise ValueError(message) from None
 
-def _check_files(study: ShownStudy, texts: Texts) -> None:
-    """Raise a ValueError if a file that was named now is not what it must be."""
-    try:
-        if "psf_file" in texts and study.psf_file is not None:
-            MeasuredPSFFile(study.psf_file)
-        if "tool" in texts and study.tool not in (None, FOUND):
-            load_tool(str(study.tool))
-    except OSError as error:
-        raise ValueError(f"{error.filename}: {error.strerror}") from None
+    def emissivities(self, study: ShownStudy) -> StoredEmissivities | None:
+        """Return the emissivities of the file that a state names, as they were at that time."""
+        return None if study.emissivity_file is None else self._emissivities[study.emissivity_file]
 
 
 def shown_study(study: Study, **shown: Any) -> ShownStudy:

@@ -38,11 +38,18 @@ from chipglow.camera.exposure_kernels import Check
 from chipglow.correction import Correction
 from chipglow.correction.zones import covers_a_pixel
 from chipglow.laboratory.chip.tool_choice import with_chosen_tool
-from chipglow.laboratory.emissivity import EmissivityLine, PlacesDescription, reflected_temperature
+from chipglow.laboratory.emissivity import (
+    EmissivityLine,
+    PlacesDescription,
+    StoredEmissivities,
+    doubts,
+    reflected_temperature,
+)
 from chipglow.laboratory.emissivity.places import ELSEWHERE, TOOL, KnownEmissivity
 from chipglow.quantities import Array
 from chipglow.quantities.units import COLDEST
 from chipglow.scene import Raster, Region, Tool
+from chipglow.scene.regions import named_value
 from chipglow.study.measured_corrections import correct_measured, misfit_notes
 from chipglow.text import Notes
 
@@ -52,8 +59,8 @@ REFERENCE: Final = "reference_temperature"
 _KEPT: Final = 8
 """Corrections that a page keeps."""
 
-KnownRegions: TypeAlias = Mapping[Region, KnownEmissivity]
-"""Regions of an image and their emissivities."""
+KnownRegions: TypeAlias = Mapping[Region, KnownEmissivity | None]
+"""Regions of an image and their emissivities; None: not stated, or by a file."""
 
 
 class _FramesModel(ABC):
@@ -129,7 +136,7 @@ class MeasurementModel(_FramesModel):
     places: PlacesDescription | None = None
     """Places and view of the session that was opened."""
     regions: KnownRegions = field(default_factory=dict)
-    """Regions that a correction distinguishes."""
+    """Regions of the page."""
     _last: dict[int, tuple[xr.Dataset, dict[str, Panel], str]] = field(
         init=False, default_factory=dict, repr=False
     )
@@ -196,14 +203,28 @@ class MeasurementModel(_FramesModel):
     def needs(self, state: State) -> str:
         """Return what a correction still needs, in words; empty if nothing."""
         study, band = state.study, "band_lower" in self.measured.first.data.attrs
+        stored = self.controls.emissivities(study)
+        emissivity = "the emissivity"
+        if stored is not None:
+            emissivity += f" or a region with a name of its file ({', '.join(stored.lines)})"
         missing = {
-            "the emissivity": study.emissivity is None and not self.regions,
+            emissivity: study.emissivity is None and not self.zones(study),
             "the PSF file": study.psf_source == PSF_FILE and study.psf_file is None,
             "the point spread function (PSF)": study.psf_source != PSF_FILE
             and study.camera.psf is None,
             "the camera's band": not band,
         }
         return " and ".join(name for name, is_missing in missing.items() if is_missing)
+
+    def zones(self, study: ShownStudy) -> KnownRegions:
+        """Return the regions that a correction distinguishes: those with an emissivity."""
+        stored = self.controls.emissivities(study)
+        lines = {} if stored is None else stored.lines
+        return {
+            region: known
+            for region, known in self.regions.items()
+            if known is not None or named_value(lines, region) is not None
+        }
 
     def corrected(self, picture: Picture, check: Callable[[float], None]) -> Picture:
         """Return a picture with the corrected image; `check` takes the completed fraction."""
@@ -212,13 +233,14 @@ class MeasurementModel(_FramesModel):
         measurement, notes, found = with_chosen_tool(measurement, study.tool)
         stated = study.outline_uncertainty
         rows, columns = self._part(state)
-        regions = [one for one in self.regions if one.mask(self.raster)[rows, columns].any()]
+        zones, stored = self.zones(study), self.controls.emissivities(study)
+        regions = [one for one in zones if one.mask(self.raster)[rows, columns].any()]
         part = measurement.part(rows=rows, columns=columns)
         tool = part.tool
         if tool is not None and not covers_a_pixel(tool, part.raster):
             tool = None
-        lines = _emissivities(study, {one: self.regions[one] for one in regions}, tool)
-        if not lines:
+        lines = _emissivities(study, {one: zones[one] for one in regions}, stored, tool)
+        if not regions and not {ELSEWHERE, TOOL} & lines.keys():
             raise ValueError(
                 "no region with an emissivity reaches the corrected part: move the cursor, or set "
                 "Part or Emissivity"
@@ -237,7 +259,8 @@ class MeasurementModel(_FramesModel):
             outline_uncertainty=found if stated is None else stated,
             progress=check,
         )
-        result = result.with_notes(notes + misfit_notes(result))
+        origin = None if stored is None else stored.origin
+        result = result.with_notes(notes + misfit_notes(result) + doubts(origin, [part]))
         self._corrected[self._key(state)] = Corrected(result)
         while len(self._corrected) > _KEPT:
             del self._corrected[next(iter(self._corrected))]
@@ -252,8 +275,10 @@ class MeasurementModel(_FramesModel):
 
     def _key(self, state: State) -> Hashable:
         rows, columns = self._part(state)
-        regions = tuple(self.regions.items())
-        return state.key(*CORRECTING), regions, self.frame(state), rows.start, columns.start
+        zones = tuple(self.zones(state.study).items())
+        stored = self.controls.emissivities(state.study)
+        where = self.frame(state), rows.start, columns.start
+        return state.key(*CORRECTING), zones, stored, where
 
     def measurement_of(self, picture: Picture) -> Measurement:
         """Return the frame of a picture."""
@@ -281,13 +306,14 @@ def psf_of(study: ShownStudy) -> PSFChoice:
 
 
 def _emissivities(
-    study: ShownStudy, regions: KnownRegions, tool: Tool | None
+    study: ShownStudy, zones: KnownRegions, stored: StoredEmissivities | None, tool: Tool | None
 ) -> dict[str, EmissivityLine]:
     """Return the emissivities of regions, of the tool, and elsewhere, by their names."""
-    lines = {region.name: known.line() for region, known in regions.items()}
+    lines = {} if stored is None else dict(stored.lines)
     if study.emissivity is not None:
         line = EmissivityLine.constant(study.emissivity, study.emissivity_uncertainty)
-        lines |= {ELSEWHERE: line, TOOL: line}
+        lines = {TOOL: line} | lines | {ELSEWHERE: line}
+    lines |= {region.name: known.line() for region, known in zones.items() if known is not None}
     if study.tool_emissivity is not None:
         own = study.tool_emissivity_uncertainty
         lines[TOOL] = EmissivityLine.constant(study.tool_emissivity, own)

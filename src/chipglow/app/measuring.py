@@ -5,7 +5,7 @@ from dataclasses import replace
 from html import escape
 from importlib.util import find_spec
 from io import BytesIO
-from math import isfinite, nan
+from math import isfinite
 from typing import Any, Final, get_args
 
 import numpy as np
@@ -105,7 +105,7 @@ class Measuring:
     """Places on the images of a page, and what they measure.
 
     `later` calls a function in the thread of the page, `say` shows a text of a kind, and `know`
-    takes the regions with an emissivity.
+    takes the regions and their emissivities.
     """
 
     def __init__(
@@ -188,12 +188,8 @@ class Measuring:
         self._later(change)  # together: the browser draws once
 
     def _regions(self) -> KnownRegions:
-        """Return the regions with an emissivity."""
-        return {
-            mark.region: mark.emissivity
-            for mark in self._marks
-            if mark.emissivity is not None and mark.region.has_area
-        }
+        """Return the regions and their emissivities."""
+        return {mark.region: mark.emissivity for mark in self._marks if mark.region.has_area}
 
     def _on_edit(self, event: Any) -> None:
         def edit() -> None:
@@ -243,16 +239,17 @@ class Measuring:
     def _show_table(self) -> None:
         readings = [self._reader.read(mark) for mark in self._marks]
         self._table = table_of(readings)
-        known = [one.emissivity for one in self._marks]
+        known = list(map(self._reader.emissivity, self._marks, readings))
         # Objects: an empty field, by which a user removes an emissivity, is not a number.
         rows = self._table.reindex(columns=[*_COLUMNS]).assign(
-            emissivity=pd.Series([one.mean if one else nan for one in known], dtype=object),
-            uncertainty=pd.Series([one.uncertainty if one else nan for one in known], dtype=object),
+            emissivity=pd.Series([mean for mean, _ in known], dtype=object),
+            uncertainty=pd.Series([uncertainty for _, uncertainty in known], dtype=object),
         )
         self._rows.value = rows
         self._rows.visible = bool(self._marks)
         self._copied.data = {"text": [self._table.to_csv(sep="\t", index=False)]}
-        warnings = [warning for one in readings for warning in one.notes.warnings]
+        notes = (*(one.notes for one in readings), self._reader.doubts)
+        warnings = [warning for one in notes for warning in one.warnings]
         self._warnings.object = "".join(f"<p>{escape(one)}</p>" for one in warnings)
         self._warnings.visible = bool(warnings)
 

@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 from chipglow.app.pictures import Corrected, Panel, Picture
 from chipglow.camera import Measurement
+from chipglow.laboratory.emissivity import StoredEmissivities
 from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 from chipglow.scene import Raster
 from chipglow.text import Notes
@@ -75,6 +76,8 @@ class Opened:
     """The frame's correction, if it is shown."""
     surroundings: tuple[float, float] | None = field(init=False, default=None)
     """Temperature of the reflected surroundings and its standard uncertainty in K, if stated."""
+    emissivities: StoredEmissivities | None = field(init=False, default=None)
+    """Emissivities of a file that the page names."""
     correction: Mapping[str, Any] = field(init=False, default_factory=dict)
     """Settings of the page for a correction, as in a file of places."""
     _shown: Any = field(init=False, default=None, repr=False)
@@ -87,19 +90,25 @@ class Opened:
         self._listeners.append(listener)
 
     def show(
-        self, picture: Picture, frames: Frames, frame: int, measured: Measurement | None
+        self,
+        picture: Picture,
+        frames: Frames,
+        frame: int,
+        measured: Measurement | None,
+        emissivities: StoredEmissivities | None,
     ) -> None:
-        """Take the images of an exact picture, all frames, and the index and data of its frame."""
+        """Take the images of an exact picture, all frames, and what is known of its frame."""
         study = picture.state.study
         reflected = study.camera.reflected
         surroundings = None if reflected is None else (reflected, study.reflected_uncertainty)
-        shown = frame, surroundings, {name: id(one.values) for name, one in picture.panels.items()}
+        images = {name: id(one.values) for name, one in picture.panels.items()}
+        shown = frame, surroundings, emissivities, images
         if shown == self._shown:  # the cursor moved
             return
         self._shown, self._panels = shown, picture.panels
         self.images = {name: ShownImage.of(panel) for name, panel in picture.panels.items()}
         self.frames, self.frame = frames, frame
         self.measured, self.corrected = measured, picture.corrected
-        self.surroundings = surroundings
+        self.surroundings, self.emissivities = surroundings, emissivities
         for listener in self._listeners:
             listener()

@@ -10,15 +10,16 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final, TypeAlias
 
 import numpy as np
+from h5py import is_hdf5
 
 from chipglow.analysis import spread_starts
 from chipglow.analysis.cut import lacking, middle_start
 from chipglow.analysis.places import LINE_REACH, TOUCHING
 from chipglow.app.asking import (
+    ASKED,
     Content,
     MissingSettingsError,
     camera_frames,
-    contents_of,
     described,
     description_text,
     imported,
@@ -29,19 +30,20 @@ from chipglow.app.frames_model import CorrectionModel, MeasuredFrames, Measureme
 from chipglow.app.models import Model
 from chipglow.app.scene_model import SceneModel, with_samples
 from chipglow.chip import Instant, Segment
-from chipglow.correction import Correction, is_correction, read_correction
+from chipglow.correction import Correction, read_correction
 from chipglow.io import (
+    FileKind,
     StoredScene,
+    checked_kind,
     example_scene,
-    is_measurement,
-    is_scene,
+    file_kind,
     open_measurement,
     open_scene,
 )
 from chipglow.io.cameras.formats import load_libraries
-from chipglow.io.measurement_file import holds
+from chipglow.io.file_kind import MEASURED
 from chipglow.io.sandbox import ReaderProcess, Sandbox
-from chipglow.laboratory.emissivity import PlacesDescription, is_places, load_places
+from chipglow.laboratory.emissivity import PlacesDescription, load_places
 from chipglow.laboratory.recordings import StoredFrames
 from chipglow.quantities import Array, unchecked
 from chipglow.scene import Raster, Scene
@@ -63,13 +65,10 @@ SHOWN: Final = ("start", "images", "scene_image", "error_image", "emissivity_unc
 
 SHOWN_LINE: Final = "# Shown in chipglow app: "
 
-_OTHER_OUTPUT: Final = {
-    ("emissivity", "region_mean"): "an emissivity map, not an image: open the measurement, and "
-    "give its places their emissivity in the table, or use chipglow correct --emissivity",
-    ("kernel", "edge1_esf"): "a point spread function, not an image: open the "
-    "measurement, and name this file under PSF",
-}
-"""Contents of the files of other commands, by the variables that only they have."""
+_SHOWN_KINDS: Final[tuple[FileKind, ...]] = (
+    "scene", "results", "study", "correction", *MEASURED, *ASKED,
+)  # fmt: skip
+"""Kinds of files that have a page; a file of places has that of the file that it names."""
 
 _Points: TypeAlias = Iterable[Any]
 """Pairs of x and y in m."""
@@ -187,7 +186,7 @@ def open_any(path: Scene | str | Path | None, study: Study | None = None) -> Mod
     if isinstance(path, Scene):
         return open_scene_object(path, study, "scene")
     path = Path(path)
-    if _is_yaml(path.name) and is_places(read_yaml(path)):
+    if file_kind(path) == "places":
         return _session(path)
     return replace(_opened(path, study), source=str(path.resolve()))
 
@@ -200,7 +199,7 @@ def _session(path: Path) -> Model | Asking:
     file = path.parent / places.file
     if not file.exists():
         raise FileNotFoundError(f"{path}: file: {file}: there is no such file")
-    if _is_yaml(file.name) and is_places(read_yaml(file)):
+    if file_kind(file) == "places":
         raise ValueError(f"{path}: file: {file} is a session too, expected a measurement")
     return with_places(open_any(file), places)
 
@@ -215,37 +214,31 @@ def with_places(opened: Model | Asking, places: PlacesDescription) -> Model | As
 
 def _opened(path: Path, study: Study | None) -> Model | Asking:
     """Open a file or folder by its content."""
-    if path.is_dir() and path.suffix.lower() != ".zarr":
+    kind = checked_kind(path, "a scene, an image or a study", *_SHOWN_KINDS)
+    if path.is_dir() and kind != "arrays":
         return _results(path)
-    if _is_yaml(path.name):
-        return _described(path) or _study(path, path.name)
-    if is_correction(path):
+    if kind == "correction":
         return correction_model(read_correction(path), path.name)
-    if is_measurement(path):
+    if kind == "measurement":
         return measurement_model(StoredFrames(open_measurement(path)), path.name)
-    for names, use in _OTHER_OUTPUT.items():
-        if holds(path, names):
-            raise ValueError(f"{path}: is {use}")
-    contents = () if is_scene(path) else contents_of(path)
-    if contents and not holds(path, ()):
-        return Asking(path, path.name, contents)
+    if kind == "camera description":
+        frames, _ = camera_frames(path, {})
+        return measurement_model(frames, path.name, path.read_text(encoding="utf-8"))
+    if kind in ASKED and not _may_be_scene(path):
+        return Asking(path, path.name, ASKED[kind])
+    if _is_yaml(path.name):
+        return _study(path, path.name)
     try:
         return open_scene_object(open_scene(path), study, path.name)
     except ValueError:
-        if not contents:
+        if kind not in ASKED:
             raise
-        return Asking(path, path.name, contents)
+        return Asking(path, path.name, ASKED[kind])
 
 
-def _described(path: Path) -> Model | Asking | None:
-    """Open the file that a description names; None if the file describes something else."""
-    data = read_yaml(path)
-    if not isinstance(data, dict):
-        return None
-    if "file" in data:
-        frames, _ = camera_frames(path, {})
-        return measurement_model(frames, path.name, path.read_text(encoding="utf-8"))
-    return Asking(path, path.name, ("scene",)) if "source" in data else None
+def _may_be_scene(path: Path) -> bool:
+    """Return whether a file of others may have the variables of a scene."""
+    return path.is_file() and bool(is_hdf5(path))
 
 
 def open_scene_object(scene: Scene, study: Study | None, name: str) -> SceneModel:
@@ -275,15 +268,19 @@ class OpenFiles:
         """Return an open file by its key; None if it is not open."""
         return self._opened.get(key)
 
-    def add(self, name: str, content: bytes) -> str:
+    def store(self, name: str, content: bytes) -> Path:
+        """Write an uploaded file to a folder of its own."""
+        folder = self.folder / token_urlsafe(12)  # bytes: nobody can guess it
+        folder.mkdir()
+        path = folder / Path(name).name
+        path.write_bytes(content)
+        return path
+
+    def add(self, path: Path) -> str:
         """Open an uploaded file and return its key; the oldest of too many is removed."""
-        key = token_urlsafe(12)  # bytes: nobody can guess it
-        name = Path(name).name
-        path = self.folder / key / name
-        path.parent.mkdir()
+        key = path.parent.name
         try:
-            path.write_bytes(content)
-            self._opened[key] = self._tried(open_uploaded(path, name, self._opened.values()))
+            self._opened[key] = self._tried(open_uploaded(path, path.name, self._opened.values()))
         except (ValueError, OSError):
             rmtree(path.parent)
             raise
@@ -369,7 +366,7 @@ def _shown_of(path: Path) -> dict[str, Any]:
 
 def _session_of_open_file(path: Path, others: Iterable[Model | Asking]) -> Model | Asking | None:
     """Return the open file that a session names, with its places; None for another file."""
-    if not is_places(read_yaml(path)):
+    if file_kind(path) != "places":
         return None
     places = load_places(path)
     named = Path(places.file or "").name

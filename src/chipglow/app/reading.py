@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chipglow.app.marks import Mark
 from chipglow.app.opened import Opened
 from chipglow.camera import Measurement
-from chipglow.laboratory.emissivity import reflected_temperature
+from chipglow.laboratory.emissivity import EmissivityLine, doubts, reflected_temperature
 from chipglow.laboratory.readings import (
     Histogram,
     PlaceCurves,
@@ -27,6 +27,7 @@ from chipglow.laboratory.readings import (
 from chipglow.quantities import Array
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, Region
+from chipglow.scene.regions import named_value
 from chipglow.text import Notes
 from chipglow.uncertainty import Estimate
 
@@ -96,7 +97,7 @@ class Reader:
             empty = statistics(nothing, ~whole, whole)
             return PlaceReading(place, empty, notes=Notes(warnings=[str(error)]))
         corrected = self._corrected(place)
-        line = None if corrected is not None else mark.line
+        line = None if corrected is not None else self._line(mark)
         if measured is not None:
             self._share_band(measured)
             reading = read_place(measured, place, mask, line, surroundings)
@@ -106,6 +107,29 @@ class Reader:
         if corrected is None:
             return reading
         return PlaceReading(place, reading.statistics, true=corrected)
+
+    def _line(self, mark: Mark) -> EmissivityLine | None:
+        """Return the emissivity of a place, its own or the file's; None if it is not known."""
+        stored = self._opened.emissivities
+        if mark.line is not None or stored is None:
+            return mark.line
+        return named_value(stored.lines, mark.region)
+
+    def emissivity(self, mark: Mark, reading: PlaceReading) -> tuple[float, float]:
+        """Return the emissivity of a place at its true temperature, and its uncertainty."""
+        if (line := self._line(mark)) is None:
+            return nan, nan
+        true = line.middle if reading.true is None else float(reading.true.values)
+        found = line.at(true)
+        return float(found.values), float(found.standard_uncertainty)
+
+    @property
+    def doubts(self) -> Notes:
+        """Warnings of emissivities of another band or metal."""
+        stored, measured = self._opened.emissivities, self._opened.measured
+        if stored is None or measured is None or "band_lower" not in measured.data.attrs:
+            return Notes()
+        return doubts(stored.origin, [measured])
 
     def _share_band(self, measured: Measurement) -> None:
         """Let a frame have the band of the last one: its tables are computed once."""

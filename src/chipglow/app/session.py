@@ -99,10 +99,12 @@ class Session:
         self._draws = Newest(self._draw, notify)
 
     def know(self, regions: KnownRegions) -> None:
-        """Set the regions of known emissivity, which a correction distinguishes."""
+        """Set the regions of the page; a correction distinguishes those with an emissivity."""
         model = self.model
-        if isinstance(model, MeasurementModel) and regions != model.regions:
-            model.regions = regions
+        if not isinstance(model, MeasurementModel):
+            return
+        before, model.regions = model.zones(self.state.study), regions
+        if model.zones(self.state.study) != before:
             self.show()
 
     def show(self) -> None:

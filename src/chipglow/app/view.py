@@ -24,7 +24,7 @@ from chipglow.analysis.attribution import AttributionReference
 from chipglow.analysis.images import PARTS
 from chipglow.app.asking import description_path
 from chipglow.app.controls import CORRECTION, ERROR_IMAGES, WHOLE, Texts, rounded
-from chipglow.app.correction_settings import correction_data, correction_texts
+from chipglow.app.correction_settings import correction_data, correction_texts, given_texts
 from chipglow.app.figures import TEXT, Figures
 from chipglow.app.frames_model import MeasurementModel
 from chipglow.app.measuring import Measuring
@@ -265,8 +265,21 @@ class PageView:
             self._uploads.ask((name, data))
 
     def _open(self, upload: tuple[str, bytes]) -> None:
+        """Open a file, or give it to the measurement that is open as its emissivity or PSF."""
         assert self._files is not None
-        self._notified("opened", self._files.add(*upload))
+        path = self._files.store(*upload)
+        if isinstance(self.session.model, MeasurementModel) and (texts := given_texts(path)):
+            self._notified("given", path, texts)
+        else:
+            self._notified("opened", self._files.add(path))
+
+    def _show_given(self, path: Path, texts: Texts) -> None:
+        try:
+            self.session.change(texts)
+        except ValueError as error:
+            self._say(str(error).replace(str(path), path.name), "error", invalid=list(texts))
+        else:
+            self._changed()
 
     # Messages to the page
 
@@ -279,9 +292,11 @@ class PageView:
             model = self.session.model
             state = picture.state
             measured = model.measurement_of(picture)
+            stored = model.controls.emissivities(state.study)
             if isinstance(model, MeasurementModel):
-                self.opened.correction = correction_data(state.study)
-            self.opened.show(picture, model.frames(state), model.frame(state), measured)
+                uploads = None if self._files is None else self._files.folder
+                self.opened.correction = correction_data(state.study, stored, uploads)
+            self.opened.show(picture, model.frames(state), model.frame(state), measured, stored)
         self._say(*self._described(picture))
         # The page draws the curves after the images: that halves the time to the images.
         content = {"number": number, "lines": self._changed_lines(picture)}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from chipglow.cli import options as opt
 from chipglow.cli.chip import chosen_frames
-from chipglow.cli.emissivity import doubts, emissivities_of, origin_of
+from chipglow.cli.emissivity import emissivities_of, origin_of
 from chipglow.cli.screen import current, figure, finish
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ def _check_options(
                 f"--study: cannot be combined with {name}, as the study states camera and surface"
             )
         return
-    stated = described is not None and described.emissivities
+    stated = described is not None and described.states_emissivity
     if known["--emissivity"] is None and known["--map"] is None and not stated:
         raise ValueError("--emissivity: give a file of chipglow emissivity, or a number; or --map")
     if known["--map"] is not None:
@@ -243,7 +243,7 @@ def _corrected(
         origin: Origin | None = lab.read_origin(file)
     else:
         emissivities = emissivities_of(file, emissivity_uncertainty, described)
-        origin = origin_of(file)
+        origin = origin_of(file, described)
     if file is None and described is not None:
         regions = described.zones()
     result = correct_measured(
@@ -255,7 +255,7 @@ def _corrected(
         elsewhere=known["--elsewhere"],
         **settings,
     )
-    return result.with_notes(doubts(origin, [measurement]))
+    return result.with_notes(lab.doubts(origin, [measurement]))
 
 
 def _print(result: "Correction", frame: "pd.DataFrame") -> None:

@@ -192,7 +192,7 @@ def temperature(
         )
     fitted = None if calibration is None else load_calibration(calibration)
     lines = emissivities_of(emissivity, emissivity_uncertainty, described)
-    origin = origin_of(emissivity)
+    origin = origin_of(emissivity, described)
 
     def found(
         measurements: "list[Measurement]", names: list[str]
@@ -201,7 +201,7 @@ def temperature(
             measurements, named, lines, surroundings, fitted, drift, names, camera_uncertainty
         )
         notes = sum((one.notes for one in measurements), result.notes)
-        return result, notes + doubts(origin, measurements)
+        return result, notes + lab.doubts(origin, measurements)
 
     if each:
         results = for_each(
@@ -217,20 +217,6 @@ def temperature(
         if study is not None:
             notes += _correct(result, measurements[0], frame, study)
     finish(notes, (table, partial(write_frame, frame)))
-
-
-def doubts(origin: "Origin | None", measurements: "list[Measurement]") -> "Notes":
-    """Warn if emissivities are of another band or metal than the measurements."""
-    from chipglow.text import Notes
-
-    if origin is None:
-        return Notes()
-    doubts = [
-        text
-        for one in measurements
-        for text in origin.warnings(one.band, str(one.data.attrs.get("metal", "")))
-    ]
-    return Notes(warnings=list(dict.fromkeys(doubts)))
 
 
 def _each(results: "dict[Path, tuple[lab.RegionTemperatures, Notes]]") -> "pd.DataFrame":
@@ -318,7 +304,7 @@ def emissivities_of(
         raise ValueError("--emissivity-uncertainty: the file states it, omit the option")
     if text is not None:
         return lab.read_emissivity_lines(Path(text))
-    if described is None or not described.emissivities:
+    if described is None or not described.states_emissivity:
         raise ValueError(
             "--emissivity: is missing; give a file of chipglow emissivity or a number, or state "
             "emissivities in the file of the regions"
@@ -326,10 +312,12 @@ def emissivities_of(
     return described.known()
 
 
-def origin_of(emissivity: str | None) -> "Origin | None":
-    """Return band and metal of the emissivities of an option, if it names a file."""
+def origin_of(emissivity: str | None, described: "lab.PlacesDescription | None") -> "Origin | None":
+    """Return band and metal of the emissivities of an option, or of what it is by default."""
     from chipglow.laboratory import emissivity as lab
 
+    if emissivity is None:
+        emissivity = None if described is None else described.emissivity_file
     if emissivity is None or _is_number(emissivity):
         return None
     return lab.read_origin(emissivity)

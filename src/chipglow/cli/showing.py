@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chipglow.camera import Flag, Measurement
 from chipglow.cli.screen import current, figure, finish
 from chipglow.drawing.scales import shown_frame
-from chipglow.io import StoredScene, is_measurement, is_scene, open_scene, read_measurement
+from chipglow.io import StoredScene, checked_kind, open_scene, read_measurement
 from chipglow.io.measurement_file import holds
 from chipglow.laboratory.recordings import flag_fractions
 from chipglow.quantities import ZERO_CELSIUS
@@ -48,15 +48,15 @@ def show(path: Path, at: float | None, plot: Path | None) -> None:
     """Print the contents of a scene or a measurement and optionally draw it."""
     from chipglow.scene import draw_scene, scene_summary
 
-    if is_measurement(path):
+    kind = checked_kind(path, "a scene or measurement", "scene", "measurement", "arrays")
+    if kind == "measurement":
         _show_measurement(path, at, plot)
         return
     if path.is_file() and not holds(path, ()):
         raise ValueError(
-            f"{path}: not a NetCDF-4 file, or truncated; expected a scene or measurement "
-            "(chipglow convert inspects camera files)"
+            f"{path}: not a NetCDF-4 file, or truncated; expected a scene or measurement"
         )
-    if path.is_file() and not (is_scene(path) or holds(path, ("temperature",))):
+    if path.is_file() and kind != "scene" and not holds(path, ("temperature",)):
         raise ValueError(
             f"{path}: contains neither temperature nor radiance; expected a scene or measurement"
         )

@@ -42,11 +42,10 @@ def convert(
 
 def _convert_one(source: Path, out: Path | None, settings: list[str]) -> None:
     from chipglow.cli.showing import say_measurement
-    from chipglow.io import is_measurement, write_measurement
+    from chipglow.io import write_measurement
     from chipglow.laboratory.recordings import load_description, load_recording, measurement_of
 
-    if is_measurement(source):
-        raise ValueError(f"{source}: already a measurement; expected a camera file")
+    _check(source)
     description = load_description(source, settings)
     recording = load_recording(description)
     screen = current()
@@ -67,12 +66,19 @@ def _convert_one(source: Path, out: Path | None, settings: list[str]) -> None:
     finish(measurement.notes, (out, partial(write_measurement, measurement)))
 
 
+def _check(source: Path) -> None:
+    from chipglow.io import checked_kind
+    from chipglow.io.file_kind import CAMERA_FILES
+
+    checked_kind(source, "a camera file", *CAMERA_FILES)
+
+
 def _convert_many(sources: list[Path], out: Path | None, settings: list[str], force: bool) -> None:
     import numpy as np
     import pandas as pd
 
     from chipglow.cli.batch import common_notes, for_each, output_files
-    from chipglow.io import is_measurement, write_measurement
+    from chipglow.io import write_measurement
     from chipglow.laboratory.recordings import load_measurement
     from chipglow.quantities import ZERO_CELSIUS
 
@@ -80,8 +86,7 @@ def _convert_many(sources: list[Path], out: Path | None, settings: list[str], fo
     notes = {}
 
     def converted(source: Path) -> dict[str, object]:
-        if is_measurement(source):
-            raise ValueError(f"{source}: already a measurement; expected a camera file")
+        _check(source)
         measurement = load_measurement(source, settings)
         notes[source] = measurement.notes
         if out is not None:

@@ -8,7 +8,6 @@ from chipglow.correction.correction import (
     joined as joined,
 )
 from chipglow.correction.file import (
-    is_correction as is_correction,
     read_correction as read_correction,
     write_correction as write_correction,
 )

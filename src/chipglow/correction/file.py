@@ -4,12 +4,7 @@ import os
 from pathlib import Path
 
 from chipglow.correction.correction import Correction
-from chipglow.io.measurement_file import holds, read_dataset, write_dataset
-
-
-def is_correction(path: str | os.PathLike[str]) -> bool:
-    """Return whether a file is a correction that `write_correction` wrote."""
-    return holds(path, ("temperature", "standard_uncertainty", "effect", "flags"))
+from chipglow.io.measurement_file import read_dataset, write_dataset
 
 
 def write_correction(correction: Correction, path: str | os.PathLike[str]) -> None:

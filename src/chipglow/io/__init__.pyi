@@ -1,5 +1,6 @@
 from .atomic import atomic_folder as atomic_folder, atomic_path as atomic_path
 from .column_file import read_curve as read_curve
+from .file_kind import FileKind as FileKind, checked_kind as checked_kind, file_kind as file_kind
 from .import_file import (
     ImportDescription as ImportDescription,
     import_description as import_description,
@@ -14,7 +15,6 @@ from .importing import (
     read_scene as read_scene,
 )
 from .measurement_file import (
-    is_measurement as is_measurement,
     open_measurement as open_measurement,
     read_measurement as read_measurement,
     write_dataset as write_dataset,
@@ -27,7 +27,6 @@ from .scene_file import (
     SceneWriter as SceneWriter,
     StoredScene as StoredScene,
     example_scene as example_scene,
-    is_scene as is_scene,
     open_scene as open_scene,
     write_scene as write_scene,
 )

@@ -1,9 +1,9 @@
 """Measurements in NetCDF-4 files."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import Final, Literal, TypeAlias, TypeVar
 
 import h5py
 import numpy as np
@@ -16,6 +16,18 @@ from chipglow.io.packing import COMPRESSION
 from chipglow.text import HDF5_ERRORS, MemoryLimitError, check_regular
 
 Made = TypeVar("Made")
+
+OwnKind: TypeAlias = Literal["scene", "measurement", "correction", "emissivity", "psf", "analysis"]
+"""Content of a file that chipglow wrote."""
+
+_VARIABLES: Final[Mapping[OwnKind, frozenset[str]]] = {
+    "measurement": frozenset(MEASUREMENT_UNITS),
+    "correction": frozenset({"temperature", "standard_uncertainty", "effect", "flags"}),
+    "emissivity": frozenset({"emissivity", "region_mean"}),
+    "psf": frozenset({"kernel", "edge1_esf"}),
+    "analysis": frozenset({"reading", "measured"}),
+}
+"""Variables that only files of a kind have."""
 
 
 def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) -> None:
@@ -50,11 +62,6 @@ def _by_frame(variable: xr.Variable) -> dict[str, tuple[int, ...]]:
     if variable.dims != ("time", "y", "x") or 0 in variable.shape:
         return {}
     return {"chunksizes": (1, *variable.shape[1:])}
-
-
-def is_measurement(path: str | os.PathLike[str]) -> bool:
-    """Return whether a file is a measurement that `write_measurement` wrote, and not a camera's."""
-    return holds(path, MEASUREMENT_UNITS)
 
 
 def read_measurement(path: str | os.PathLike[str]) -> Measurement:
@@ -99,10 +106,28 @@ def read_dataset(
 
 def holds(path: str | os.PathLike[str], names: Iterable[str]) -> bool:
     """Return whether a file is HDF5, whole enough to be opened, and has all these at its root."""
+    return (found := _root(path)) is not None and set(names) <= found[0]
+
+
+def own_kind(path: str | os.PathLike[str]) -> OwnKind | None:
+    """Return what chipglow wrote to a file; None if it is a file of others or does not exist."""
+    if (found := _root(path)) is None:
+        return None
+    variables, attributes = found
+    if "chipglow_format" in attributes:
+        return "scene"
+    return next((kind for kind, own in _VARIABLES.items() if own <= variables), None)
+
+
+def _root(path: str | os.PathLike[str]) -> tuple[set[str], set[str]] | None:
+    """Return the names of variables and of attributes of a file; None if it is not HDF5.
+
+    A file of chipglow that is damaged is a ValueError.
+    """
     path = Path(path)
     check_regular(path)
     if not path.is_file() or not h5py.is_hdf5(path):
-        return False
+        return None
     if is_intact(path) is False:
         try:
             check_file(path)
@@ -110,6 +135,6 @@ def holds(path: str | os.PathLike[str], names: Iterable[str]) -> bool:
             raise ValueError(f"{path}: {error}") from None
     try:
         with h5py.File(path, "r") as file:
-            return set(names) <= set(file)
+            return set(file), set(file.attrs)
     except HDF5_ERRORS:
-        return False
+        return None

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipglow.io import spline_file
 from chipglow.io.atomic import uninterrupted
 from chipglow.io.digest import HDF5Sink, check_file, write_hdf5
-from chipglow.io.measurement_file import holds
+from chipglow.io.measurement_file import own_kind
 from chipglow.io.packing import COMPRESSION, chunk_of, read_chunk, rounded
 from chipglow.io.spool import UnfinishedScene, spooled
 from chipglow.scene import (
@@ -365,7 +365,7 @@ def open_scene(path: str | os.PathLike[str]) -> StoredScene:
     """
     path = Path(path)
     results = path / "results.nc" if path.is_dir() else path
-    if holds(results, ("reading", "measured")):
+    if own_kind(results) == "analysis":
         raise SceneError(
             f"{path}: results of an analysis, expected a scene: see report.html beside "
             "results.nc, open the folder by chipglow app, or write the scene by chipglow cut "
@@ -395,14 +395,6 @@ def example_scene() -> StoredScene:
         look; those to rely on are the full study's.
     """
     return open_scene(Path(str(files("chipglow.io").joinpath("example-scene.nc"))))
-
-
-def is_scene(path: str | os.PathLike[str]) -> bool:
-    """Return whether a file is one that `SceneWriter` or `write_scene` wrote."""
-    if not holds(path, ()):
-        return False
-    with h5py.File(path, "r") as file:
-        return "chipglow_format" in file.attrs
 
 
 def write_scene(scene: Scene, path: str | os.PathLike[str], *, samples: bool = False) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Recording
 from chipglow.camera.recording import SignalKind
-from chipglow.io import atomic_path
+from chipglow.io.atomic import atomic_path
 from chipglow.io.cameras.binary import Binary, CameraFile, check_picture, layout
 from chipglow.io.sources import SourceError
 from chipglow.text import Notes

@@ -13,7 +13,9 @@ from chipglow.laboratory.emissivity.emissivity import (
 from chipglow.laboratory.emissivity.file import (
     EmissivityMapFile as EmissivityMapFile,
     MeasuredEmissivity as MeasuredEmissivity,
+    StoredEmissivities as StoredEmissivities,
     SurfaceFile as SurfaceFile,
+    doubts as doubts,
     emissivity_trend as emissivity_trend,
     measured_features as measured_features,
     measured_text as measured_text,
@@ -26,7 +28,6 @@ from chipglow.laboratory.emissivity.file import (
 from chipglow.laboratory.emissivity.places import (
     PlacesDescription as PlacesDescription,
     RegionSection as RegionSection,
-    is_places as is_places,
     load_places as load_places,
     load_regions as load_regions,
 )

@@ -3,7 +3,7 @@
 import os
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final
@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 import yaml
 
+from chipglow.camera import Measurement
 from chipglow.io import write_dataset
 from chipglow.io.measurement_file import Made, read_dataset
 from chipglow.laboratory.emissivity.emissivity import (
@@ -29,6 +30,7 @@ from chipglow.quantities.units import WAVELENGTHS
 from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
 from chipglow.surface import SURFACES, EmissivityTrend, MapSurface, Origin, Surface, TrendSurface
+from chipglow.text import Notes
 from chipglow.uncertainty import Cause, Component, Estimate
 from chipglow.uncertainty.dataset import correlation_forms
 
@@ -188,6 +190,31 @@ def read_emissivity_map(path: str | os.PathLike[str]) -> MapSurface:
         return MapSurface(mean, raster, 0.0, slopes, middle, spread, origin=_origin(data))
 
     return _read(Path(path), surface)
+
+
+@dataclass(frozen=True, eq=False)
+class StoredEmissivities:
+    """Emissivities of a file by the names of their areas, and what they were measured on."""
+
+    lines: Mapping[str, EmissivityLine]
+    origin: Origin
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> "StoredEmissivities":
+        """Read a file of `write_emissivity`."""
+        return _read(Path(path), lambda data: cls(_lines(data), _origin(data)))
+
+
+def doubts(origin: Origin | None, measurements: Iterable[Measurement]) -> Notes:
+    """Warn if emissivities are of another band or metal than the measurements."""
+    if origin is None:
+        return Notes()
+    doubts = [
+        text
+        for one in measurements
+        for text in origin.warnings(one.band, str(one.data.attrs.get("metal", "")))
+    ]
+    return Notes(warnings=list(dict.fromkeys(doubts)))
 
 
 def read_origin(path: str | os.PathLike[str]) -> Origin:

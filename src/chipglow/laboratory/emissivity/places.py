@@ -8,8 +8,9 @@ from pydantic import BeforeValidator, PlainValidator, ValidationInfo
 
 from chipglow.camera import PSFS, PSFChoice
 from chipglow.laboratory.emissivity.emissivity import LABORATORY, EmissivityLine
+from chipglow.laboratory.emissivity.file import read_emissivity_lines
 from chipglow.laboratory.emissivity.temperature import reflected_temperature
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.part import beside_the_study
 from chipglow.quantities.units import KELVINS, LENGTH, POSITION, TEMPERATURE, TEMPERATURE_DIFFERENCE
 from chipglow.scene import Circle, Pixel, Polygon, Polyline, Region
@@ -161,6 +162,13 @@ class PlacesDescription(Part):
             "'elsewhere' for the rest of the image."
         ),
     ] = field(default_factory=dict)
+    emissivity_file: Annotated[
+        FileBeside | None,
+        Parameter(
+            "Output of chipglow emissivity: emissivities by the name of a place or feature, except "
+            "those that 'emissivities' states."
+        ),
+    ] = None
     reflected: Annotated[
         float, Parameter("Temperature of the reflected surroundings.", KELVINS)
     ] = LABORATORY
@@ -216,15 +224,23 @@ class PlacesDescription(Part):
 
     def zones(self) -> tuple[Region, ...]:
         """Return the regions with an emissivity, which a correction distinguishes."""
+        known = self.known()
         return tuple(
             place
             for place in self.places()
-            if place.has_area and named_value(self.emissivities, place) is not None
+            if place.has_area and named_value(known, place) is not None
         )
+
+    @property
+    def states_emissivity(self) -> bool:
+        """Whether there are emissivities."""
+        return bool(self.emissivities) or self.emissivity_file is not None
 
     def known(self) -> dict[str, EmissivityLine]:
         """Return the emissivities by the names of their places or features."""
-        return {name: one.line() for name, one in self.emissivities.items()}
+        file = self.emissivity_file
+        stored = {} if file is None else read_emissivity_lines(file)
+        return stored | {name: one.line() for name, one in self.emissivities.items()}
 
     def surroundings(self) -> Estimate | None:
         """Return the temperature of the reflected surroundings in K if it is stated."""
@@ -251,11 +267,6 @@ def _numbers(*coordinates: float | str) -> tuple[list[float], Literal["pixel", "
         raise ValueError("pixels and lengths are mixed, expected all of one kind")
     numbers = [POSITION.parse(one) if isinstance(one, str) else one for one in coordinates]
     return numbers, "m" if True in kinds else "pixel"
-
-
-def is_places(data: object) -> bool:
-    """Return whether the content of a YAML file is a file of places."""
-    return isinstance(data, dict) and bool({"regions", "points", "lines", "view"} & data.keys())
 
 
 def load_places(path: str | Path) -> PlacesDescription:

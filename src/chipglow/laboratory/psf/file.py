@@ -9,7 +9,8 @@ from typing import Annotated
 import xarray as xr
 
 from chipglow.camera import MeasuredPSF
-from chipglow.io import is_measurement, is_scene, write_dataset
+from chipglow.io import checked_kind, write_dataset
+from chipglow.io.file_kind import MEASURED
 from chipglow.laboratory.psf.edge_image import EdgeImage, counts_image, edge_image
 from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge, psf_kernel
 from chipglow.laboratory.psf.psf_fit import ModelFit
@@ -33,7 +34,7 @@ def load_edge(
 ) -> EdgeImage:
     """Read an image of an edge; counts serve without a calibration, as no temperature is needed."""
     settings, name = list(settings), Path(source).name
-    if is_measurement(source) or is_scene(source):
+    if checked_kind(source, "an image of an edge", *MEASURED) == "measurement":
         return edge_image(load_measurement(source, settings), name, region)
     described = load_description(source, settings)
     recording = load_recording(described)

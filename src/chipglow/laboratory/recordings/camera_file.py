@@ -18,11 +18,12 @@ from chipglow.camera import (
     Recording,
     find_bad_pixels,
 )
-from chipglow.io import is_measurement, is_scene, read_measurement
+from chipglow.io import checked_kind, read_measurement
 from chipglow.io.cameras import camera_formats, read_recording
 from chipglow.io.cameras.formats import find_format
 from chipglow.io.cameras.stacks import MissingError, Stated
 from chipglow.io.column_file import read_bad_pixels
+from chipglow.io.file_kind import MEASURED
 from chipglow.io.sources.file_names import files_of
 from chipglow.laboratory.recordings.calibration_file import load_calibration
 from chipglow.laboratory.recordings.description import MeasurementDescription, load_description
@@ -56,14 +57,11 @@ def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measur
         Fields of the description, such as ``band=3.8-5.1 um``, which override a YAML file.
     """
     settings = list(settings)
-    if is_measurement(source):
+    kind = checked_kind(source, "a measurement or a camera file", *MEASURED)
+    if kind == "measurement":
         for setting in settings:
             raise ValueError(f"--set: {setting!r} describes nothing of a measurement's own file")
         return read_measurement(source)
-    if is_scene(source):
-        raise DescriptionError(
-            f"{source}: is a scene, expected a measurement; chipglow measure creates one from it"
-        )
     described = load_description(source, settings)
     return measurement_of(described, load_recording(described), str(source))
 
