@@ -11,11 +11,14 @@ from contextlib import contextmanager
 import pandas as pd
 import pytest
 import xarray as xr
+from command import run
 from hot_frames import hot_frames
+from synthetic_edge import edge_radiance, gaussian_edge, image_of
 
 from chipglow.camera import GaussianPSF
 from chipglow.io import example_scene, write_measurement, write_scene
 from chipglow.laboratory.emissivity import load_places
+from chipglow.laboratory.psf import knife_edge, write_psf
 from chipglow.laboratory.readings import read_places
 
 pytest.importorskip("panel", reason="needs the extra app")
@@ -132,6 +135,30 @@ def test_regions_and_a_file_of_the_psf_correct_the_image(browser, tmp_path):
     with visited(browser, tmp_path / "session.yaml", 400, 900) as page:
         page.locator("#status", has_text=re.compile("^Corrected")).wait_for()
         assert rows(page, 1)[0][9] == true
+        assert page.evaluate("document.documentElement.scrollWidth") == 400
+
+
+def test_dropped_files_of_emissivity_and_psf_correct_the_image(browser, tmp_path):
+    write_measurement(hot_frames(1), tmp_path / "hot.nc")
+    (tmp_path / "heated.yaml").write_text("regions: {box 1: {rectangle: [[30, 26], [50, 40]]}}\n")
+    heated = ["--regions", tmp_path / "heated.yaml", "--reference", "900 degC"]
+    run("emissivity", tmp_path / "hot.nc", *heated, "--out", tmp_path / "emissivity.nc")
+    edge = image_of(edge_radiance(gaussian_edge(12e-6), 5.0, 40), 0.05, 0, None, "edge")
+    write_psf(knife_edge([edge]), tmp_path / "psf.nc")
+    with visited(browser, tmp_path / "hot.nc", 400, 900) as page:
+        dropped = page.locator("input[type=file]")
+        dropped.set_input_files(tmp_path / "emissivity.nc")
+        needs = "Set the emissivity or a region with a name of its file (box 1)"
+        page.locator("#status", has_text=needs).wait_for()
+        choose(page, "Box")
+        drag(page, (170, 150), (300, 240))
+        page.locator("#status", has_text=re.compile(r"^Measured image\. Set the point")).wait_for()
+        dropped.set_input_files(tmp_path / "psf.nc")
+        page.locator("#status", has_text=re.compile("^Corrected")).wait_for()
+        ((_, _, mean, *_, emissivity, _, true, half_width, _),) = rows(page, 1)
+        # The object is taken to have 900 degC in emissivity.nc, and this box is a part of it.
+        assert 0 < float(emissivity) < 0.5 and float(half_width) > 0
+        assert 700 < float(true) < 1100 and float(mean) < 480
         assert page.evaluate("document.documentElement.scrollWidth") == 400
 
 
