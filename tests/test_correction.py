@@ -1,6 +1,7 @@
 """The true temperature of every pixel: solution, intervals, flags and refusals."""
 
 from dataclasses import astuple, replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -18,15 +19,16 @@ from chipglow.correction import (
     write_correction,
 )
 from chipglow.correction.cells import cut_cells
-from chipglow.correction.correct import _MARGIN, _image, _located
-from chipglow.correction.posterior import Image, Problem
-from chipglow.correction.sensitivity import (
+from chipglow.correction.correct import _MARGIN, _image, _problem, _problem_and_beyond
+from chipglow.correction.outline import (
     _OUTLINE_ERROR,
-    Knowledge,
     LinearErrors,
     _motion_images,
+    find_outlines,
     fit_outline,
 )
+from chipglow.correction.posterior import Image, Problem
+from chipglow.correction.sensitivity import Knowledge
 from chipglow.correction.zones import Motion, ShapedObject
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.emissivity import EmissivityLine
@@ -316,7 +318,9 @@ def test_a_gap_at_the_outline_does_not_move_it():
     known = Knowledge(stated, BAND, 0.0, 0.5 * PITCH, DARK)
     inside, _ = _image(image, 0, CAMERA, 0.1, float(DARK.values))
     extended = inside.extended(_MARGIN)
-    found, _, _ = _located(extended, CAMERA, known, pixels, [], lambda: None)
+    first = _problem_and_beyond(extended, CAMERA, known, pixels)
+    problem_of = partial(_problem, extended, CAMERA, pixels.widened(_MARGIN))
+    found, _, _ = find_outlines(first, known, [], problem_of, lambda: None)
     motion = np.array(astuple(found.observed.motion)[:2]) / PITCH
     normal = np.array([1.0, -0.2]) / np.hypot(1.0, 0.2)
     # Two of its smallest standard uncertainties; with an even prior the gap moves it by 0.33.

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
-from itertools import chain
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -17,19 +17,15 @@ from chipglow.correction.beyond import Beyond
 from chipglow.correction.cells import CELLS_PER_PIXEL, Parts, cut_cells
 from chipglow.correction.correction import Correction, CorrectionFlag, joined
 from chipglow.correction.noise import noise_of
-from chipglow.correction.posterior import Image, Posterior, Problem
+from chipglow.correction.outline import OutlineFit, find_outlines, outline_effect
+from chipglow.correction.posterior import Image, Problem
 from chipglow.correction.sensitivity import (
     BIAS_FACTOR,
     Effect,
     Knowledge,
-    LinearErrors,
-    OutlineFit,
-    fit_outline,
     noise_effect,
-    outline_effect,
     smoothing_effect,
     systematic_effects,
-    systematic_images,
     texture_effect,
 )
 from chipglow.correction.zones import Motion, ObservedObject, ShapedObject, Zone, check_tools
@@ -50,29 +46,6 @@ of a twenty-fourth of a pixel: up to 3e-4 of the radiance.
 
 _READINGS: Final = 256
 """Readings below the range of which the mean is taken; an integral, to 1 %."""
-
-_OUTLINE_ROUNDS: Final = 25
-"""Most rounds in which the outlines move to fit the image; 2 to 5 are usual, far away up to 15."""
-
-_OUTLINE_FOUND: Final = 0.5
-"""Last motion of the outlines in standard uncertainties: the next one would be a tenth of it."""
-
-_ELSEWHERE: Final = 0.7
-"""Distance in pixels at which a second minimum is looked for.
-
-In analytic scenes, where there is one, it is 0.6 to 0.8 pixels from the outline."""
-
-_FAR_LESS: Final = 0.67
-"""Loss relative to that of a found position from which on another one is the right one.
-
-In a scene with a second minimum it was 0.4; at a gap in a cut, places farther and farther behind
-the edge had 0.85 to 0.95 of the loss at the outline."""
-
-_LEVEL_FACTOR: Final = 2.0
-"""Standard uncertainties within which positions are looked for: 95 % of them."""
-
-_OUTLINE_STILL: Final = 0.005
-"""Mean displacement in pixels that changes nothing: outlines may slide along themselves."""
 
 _BORDER: Final = 3
 """Width in pixels of the border whose values depend on radiance from beyond the image."""
@@ -243,8 +216,10 @@ def _corrected(
     calibration = _calibration_images(measurement, frame)
     fit, former = None, None
     if known.outline_uncertainty:
-        known, fit, former = _located(
-            image, camera, known, measurement.raster, calibration, lambda: progress(0.0)
+        first = _problem_and_beyond(image, camera, known, measurement.raster)
+        problem_of = partial(_problem, image, camera, measurement.raster.widened(_MARGIN))
+        known, fit, former = find_outlines(
+            first, known, calibration, problem_of, lambda: progress(0.0)
         )
     problem = _problem_and_beyond(image, camera, known, measurement.raster)
     posterior = problem.solve(generator, lambda: progress(0.0), former)
@@ -281,10 +256,6 @@ def _calibration_images(measurement: Measurement, frame: int) -> list[Array]:
         return []
     changes = errors.at(np.nan_to_num(measurement.radiance[frame]))
     return [np.pad(change, _MARGIN) for change in changes]
-
-
-def _added(one: Motion, other: Motion) -> Motion:
-    return Motion(one.right + other.right, one.up + other.up, one.turn + other.turn)
 
 
 def _image(
@@ -332,91 +303,14 @@ def _received(displayed: Array, camera: Camera, pixels: Raster) -> tuple[Array, 
     return (displayed - dark) / gain, gain
 
 
-def _located(
-    image: Image,
-    camera: Camera,
-    known: Knowledge,
-    inner: Raster,
-    calibration: list[Array],
-    check: Callable[[], None],
-) -> tuple[Knowledge, OutlineFit, Posterior]:
-    """Move the outlines to where the image shows them.
-
-    The prior is nearly even: weights that follow from the data would admit, where an outline is
-    wrong, the bends of the radiance that this error causes.
-
-    The search may end at a second minimum. The loss on both sides tells: where it is far less, the
-    search continues from there; where it is a little less, as a gap behind the edge can make it,
-    the uncertainty contains that place too.
-    """
-    pixels = inner.widened(_MARGIN)
-
-    def problem_of(observed: ObservedObject) -> Problem:
-        return _problem(image, camera, replace(known, observed=observed), pixels)
-
-    posterior = _problem_and_beyond(image, camera, known, inner).smooth_robustly(check)
-    images = [*chain(*systematic_images(posterior, known, calibration).values())]
-    systematic = LinearErrors.of(posterior, images)
-    found, fit, posterior = _moved_to_fit(posterior, known, systematic, problem_of, check)
-    for shift in _shifts_elsewhere(found, fit, inner.spacing):
-        elsewhere = _shifted(found, shift)
-        other = problem_of(elsewhere.observed).smooth_robustly(check, posterior)
-        if other.robust_loss < _FAR_LESS * posterior.robust_loss:
-            return _moved_to_fit(other, elsewhere, systematic, problem_of, check)
-        if other.robust_loss < posterior.robust_loss:
-            fit = fit.doubted(shift)
-    return found, fit, posterior
-
-
-def _moved_to_fit(
-    posterior: Posterior,
-    known: Knowledge,
-    systematic: LinearErrors,
-    problem_of: Callable[[ObservedObject], Problem],
-    check: Callable[[], None],
-) -> tuple[Knowledge, OutlineFit, Posterior]:
-    """Move the outlines until they fit the image."""
-    for _ in range(_OUTLINE_ROUNDS):
-        fit = fit_outline(posterior, known, systematic)
-        observed = known.observed.moved(_added(known.observed.motion, fit.motion))
-        known = replace(known, observed=observed)
-        if not fit.moves(_OUTLINE_FOUND):
-            break
-        problem = problem_of(observed)
-        if posterior.problem.parts.displacement(problem.parts) < _OUTLINE_STILL:
-            break
-        posterior = problem.smooth_robustly(check, posterior)
-    return known, fit, posterior
-
-
-def _shifts_elsewhere(known: Knowledge, fit: OutlineFit, pitch: float) -> list[Array]:
-    """Return the shifts (right, up) in m to places where a second minimum may be.
-
-    They are those along which the image shows the position, within the stated uncertainty.
-    """
-    motion = np.array([known.observed.motion.right, known.observed.motion.up])
-    most = _LEVEL_FACTOR * known.outline_uncertainty
-    shifts = [
-        sign * _ELSEWHERE * pitch * direction
-        for direction in fit.shown(known.outline_uncertainty / 2)
-        for sign in (1.0, -1.0)
-    ]
-    return [shift for shift in shifts if np.linalg.norm(motion + shift) < most]
-
-
-def _shifted(known: Knowledge, shift: Array) -> Knowledge:
-    motion = _added(known.observed.motion, Motion(*shift))
-    return replace(known, observed=known.observed.moved(motion))
-
-
 def _problem_and_beyond(image: Image, camera: Camera, known: Knowledge, inner: Raster) -> Problem:
     """Return the problem of an image with a margin around the `inner` pixels, and light beyond."""
-    problem = _problem(image, camera, known, inner.widened(_MARGIN))
+    problem = _problem(image, camera, inner.widened(_MARGIN), known)
     problem.beyond = Beyond.of(known.observed, problem.parts, problem.formation, inner)
     return problem
 
 
-def _problem(image: Image, camera: Camera, known: Knowledge, pixels: Raster) -> Problem:
+def _problem(image: Image, camera: Camera, pixels: Raster, known: Knowledge) -> Problem:
     parts = cut_cells(known.observed, pixels)
     formation = image_formation(camera, parts.cells, pixels=pixels)
     room = float(known.band.radiance(known.surroundings.values))

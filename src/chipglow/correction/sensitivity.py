@@ -1,7 +1,7 @@
 """Changes of the corrected radiance by each source of uncertainty."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import astuple, dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Final
 
@@ -10,10 +10,10 @@ from scipy.ndimage import gaussian_filter
 
 from chipglow.camera import ImageFormation, MeasuredPSF, PointSpreadFunction
 from chipglow.camera.optics.psf import FWHM_PER_SIGMA
-from chipglow.correction.cells import Parts, cut_cells
+from chipglow.correction.cells import Parts
 from chipglow.correction.posterior import Posterior
 from chipglow.correction.prior import local_mean
-from chipglow.correction.zones import Motion, ObservedObject
+from chipglow.correction.zones import ObservedObject
 from chipglow.quantities import Array
 from chipglow.radiometry import Band
 from chipglow.uncertainty import Estimate
@@ -31,33 +31,6 @@ the intervals at known outlines held 95 % on 30 scenes for tuning of ``benchmark
 
 _WIDTH_STEP: Final = 0.01
 """Relative change of the width of the point spread function for derivatives."""
-
-_OUTLINE_STEP: Final = 0.03
-"""Displacement of the outlines in pixels for derivatives; cells are cut to 1/8192 of a pixel."""
-
-_OUTLINE_ERROR: Final = 0.04
-"""Smallest standard uncertainty in pixels of a found position: no chip is evenly smooth.
-
-Outlines of 40 analytic scenes for tuning of ``benchmarks/correction.py`` erred by 0.01 pixels
-(median), the worst one of a clear outline by 0.07.
-"""
-
-_CELLS_ALIKE: Final = 9.0
-"""Number of cells with similar bends, though the prior takes each for independent.
-
-With a ninth of the information, 28 of 29 outlines in cuts for tuning were within two standard
-uncertainties of the truth; with all of it 22.
-"""
-
-_RESPONSE_TOLERANCE: Final = 1e-2
-"""Relative error of the solution's response to a motion, which counts in the second order."""
-
-_CELL_ERROR: Final = 0.003
-"""Standard uncertainty in pixels of an outline by the cells, also of one whose position is exact.
-
-Images by cells half as wide as a pixel err by up to 0.07 K beside an outline, as much as by such a
-displacement.
-"""
 
 _PSF_DRAWS: Final = 6
 """Draws of the point spread function within its uncertainty."""
@@ -236,137 +209,3 @@ def _border_images(posterior: Posterior) -> list[Array]:
     """Return the change of the image by the radiance beyond each side of it."""
     beyond = posterior.problem.beyond
     return [] if beyond is None else beyond.errors(posterior.beyond)
-
-
-@dataclass(frozen=True, eq=False)
-class OutlineFit:
-    """The motion of the outlines, from their present position, that the image shows."""
-
-    motion: Motion
-    root: Array
-    """Motions in m (turns at `_turn_radius`) of one standard uncertainty each, (3, direction)."""
-    standard_uncertainty: Motion
-
-    turn_radius: float
-    """Distance in m at which `root` states turns."""
-
-    def moves(self, least: float) -> bool:
-        """Return whether the outlines move by `least` standard uncertainties or more.
-
-        Along a straight outline, where nothing shows its position, this is a large motion.
-        """
-        lengths = np.array(astuple(self.motion)) * (1.0, 1.0, self.turn_radius)
-        return bool(np.linalg.norm(np.linalg.solve(self.root, lengths)) >= least)
-
-    def shown(self, most: float) -> Array:
-        """Return the directions (right, up) in which the standard uncertainty is below `most` m."""
-        variances, directions = np.linalg.eigh((self.root @ self.root.T)[:2, :2])
-        return np.asarray(directions.T[variances < most**2])
-
-    def doubted(self, shift: Array) -> "OutlineFit":
-        """Return the fit if the outlines may as well be displaced by `shift` (right, up) in m."""
-        covariance = self.root @ self.root.T
-        covariance[:2, :2] += np.outer(shift, shift) / 4
-        return _outline_fit(self.motion, covariance, self.turn_radius)
-
-
-@dataclass(frozen=True, eq=False)
-class LinearErrors:
-    """Systematic errors that are estimated with the outlines' position."""
-
-    images: Sequence[Array]
-    """Changes of the image by one standard uncertainty each."""
-    responses: Array
-    """Changes of the solution by those of the image, (error, part)."""
-    parts: Parts
-
-    @classmethod
-    def of(cls, posterior: Posterior, images: Sequence[Array]) -> "LinearErrors":
-        responses = posterior.changed_all(images, _RESPONSE_TOLERANCE)
-        return cls(images, responses, posterior.problem.parts)
-
-    def responses_at(self, parts: Parts) -> Array:
-        """Return the responses at the parts of other outlines, without solving again."""
-        responses = [self.parts.continued(one, parts) for one in self.responses]
-        return np.reshape(responses, (len(self.images), parts.size))
-
-
-def fit_outline(posterior: Posterior, known: Knowledge, systematic: LinearErrors) -> OutlineFit:
-    """Estimate the motion of the outlines together with the radiance, linearised.
-
-    The image shows the position where the radiance changes across an outline. Where it does not,
-    the stated uncertainty remains. A motion is not larger than that uncertainty. The `systematic`
-    errors are estimated too: they may look like a motion.
-    """
-    turn_radius = _turn_radius(posterior.problem.parts)
-    motions = _motion_images(posterior, known)
-    images = [*motions, *systematic.images]
-    of_motions = posterior.changed_all(motions, _RESPONSE_TOLERANCE)
-    others = systematic.responses_at(posterior.problem.parts)
-    responses = np.concatenate([of_motions, others])
-    weights, changes = posterior.pixel_weights, np.stack(images)
-    unexplained = changes - np.stack([posterior.seen_change(one) for one in responses])
-    # These sums over data and prior depend on errors of the responses in the second order only.
-    information = np.tensordot(weights * unexplained, unexplained, ((1, 2), (1, 2)))
-    information += responses @ (posterior.bending @ responses.T)
-    slope = np.tensordot(changes, weights * posterior.residual) - responses @ posterior.gradient
-    deviations = np.ones(len(images))
-    deviations[:3] = known.outline_uncertainty
-    scale = np.array([1.0, 1.0, 1 / turn_radius])
-    former = np.zeros(len(images))
-    former[:3] = np.array(astuple(known.observed.motion)) / scale
-    covariance = np.linalg.inv(information / _CELLS_ALIKE + np.diag(deviations**-2.0))
-    motion = (covariance @ (slope / _CELLS_ALIKE - former / deviations**2))[:3]
-    # Without an outline in the image, the motion is zero.
-    motion *= known.outline_uncertainty / max(np.abs(motion).max(), known.outline_uncertainty)
-    least = _OUTLINE_ERROR * posterior.problem.parts.pixels.spacing
-    covariance = covariance[:3, :3] + least**2 * np.eye(3)
-    return _outline_fit(Motion(*(motion * scale)), covariance, turn_radius)
-
-
-def _outline_fit(motion: Motion, covariance: Array, turn_radius: float) -> OutlineFit:
-    """Return the fit of a motion with its covariance in m², turns at their radius."""
-    spread = np.sqrt(np.diag(covariance)) / (1.0, 1.0, turn_radius)
-    root = np.asarray(np.linalg.cholesky((covariance + covariance.T) / 2), np.float64)
-    return OutlineFit(motion, root, Motion(*spread), turn_radius)
-
-
-def outline_effect(posterior: Posterior, known: Knowledge, fit: OutlineFit | None) -> Effect:
-    """Return the effect of the remaining uncertainty of the outlines' position.
-
-    Without a fit, the position is exact but for the cells.
-    """
-    images = np.stack(_motion_images(posterior, known))
-    least = _CELL_ERROR * posterior.problem.parts.pixels.spacing
-    errors = least * images if fit is None else np.tensordot(fit.root.T, images, axes=1)
-    return Effect("outline", -posterior.changed_all(list(errors)))
-
-
-def _turn_radius(parts: Parts) -> float:
-    """Return the distance in m at which a turn is as large as a shift: a quarter of the image."""
-    return max(parts.pixels.shape) * parts.pixels.spacing / 4
-
-
-def _motion_images(posterior: Posterior, known: Knowledge) -> list[Array]:
-    """Return the changes of the image with a motion to the right, up and with a turn, per m."""
-    parts = posterior.problem.parts
-    step = _OUTLINE_STEP * parts.pixels.spacing
-    motion, scale = np.array(astuple(known.observed.motion)), (1.0, 1.0, _turn_radius(parts))
-    images = []
-    for direction in np.eye(3):
-        ahead, behind = (
-            known.observed.moved(Motion(*(motion + sign * step * direction / scale)))
-            for sign in (1.0, -1.0)
-        )
-        change = _image_of_moved(posterior, ahead) - _image_of_moved(posterior, behind)
-        images.append(np.asarray(change / (2 * step)))
-    return images
-
-
-def _image_of_moved(posterior: Posterior, observed: ObservedObject) -> Array:
-    """Return the image of moved zones whose fields stay and continue into new cells."""
-    problem = posterior.problem
-    parts = cut_cells(observed, problem.parts.pixels)
-    x = problem.parts.continued(posterior.x, parts)
-    light = parts.spread(x) @ (parts.area * parts.emissivity * np.exp(parts.at_centroids @ x))
-    return problem.formation.forward(light.reshape(parts.cells.shape))
