@@ -19,15 +19,16 @@ _OUTLINE_ROUNDS: Final = 25
 _OUTLINE_FOUND: Final = 0.5
 """Last motion of the outlines in standard uncertainties: the next one would be a tenth of it."""
 
-_ELSEWHERE: Final = 0.7
-"""Distance in pixels at which a second minimum is looked for.
+_ELSEWHERE: Final = 0.5, 0.8
+"""Distances in pixels at which a second minimum is looked for.
 
-In analytic scenes, where there is one, it is 0.6 to 0.8 pixels from the outline."""
+In analytic scenes, where there is one, it is 0.5 to 0.8 pixels from the outline, and the loss is
+less than there within 0.15 pixels of the outline."""
 
 _FAR_LESS: Final = 0.67
 """Loss relative to that of a found position from which on another one is the right one.
 
-In a scene with a second minimum it was 0.4; at a gap in a cut, places farther and farther behind
+In scenes with a second minimum it was 0.4; at a gap in a cut, places farther and farther behind
 the edge had 0.85 to 0.95 of the loss at the outline."""
 
 _LEVEL_FACTOR: Final = 2.0
@@ -133,9 +134,9 @@ def find_outlines(
     The prior is nearly even: weights that follow from the data would admit, where an outline is
     wrong, the bends of the radiance that this error causes.
 
-    The search may end at a second minimum. The loss on both sides tells: where it is far less, the
-    search continues from there; where it is a little less, as a gap behind the edge can make it,
-    the uncertainty contains that place too.
+    The search may end at a second minimum. Where the loss is less at a place beside it, another
+    search begins there. If that one ends at a far smaller loss, its end counts; if the loss is a
+    little smaller, as a gap behind the edge can make it, the uncertainty contains that place too.
     """
     posterior = first.smooth_robustly(check)
     images = [*chain(*systematic_images(posterior, known, calibration).values())]
@@ -144,10 +145,13 @@ def find_outlines(
     for shift in _shifts_elsewhere(found, fit, first.parts.pixels.spacing):
         elsewhere = _shifted(found, shift)
         other = problem_of(elsewhere).smooth_robustly(check, posterior)
-        if other.robust_loss < _FAR_LESS * posterior.robust_loss:
-            return _moved_to_fit(other, elsewhere, systematic, problem_of, check)
-        if other.robust_loss < posterior.robust_loss:
-            fit = fit.doubted(shift)
+        if other.robust_loss >= posterior.robust_loss:
+            continue
+        second = _moved_to_fit(other, elsewhere, systematic, problem_of, check)
+        _, _, there = second
+        if there.robust_loss < _FAR_LESS * posterior.robust_loss:
+            return second
+        fit = fit.doubted(shift)
     return found, fit, posterior
 
 
@@ -180,8 +184,9 @@ def _shifts_elsewhere(known: Knowledge, fit: OutlineFit, pitch: float) -> list[A
     motion = np.array([known.observed.motion.right, known.observed.motion.up])
     most = _LEVEL_FACTOR * known.outline_uncertainty
     shifts = [
-        sign * _ELSEWHERE * pitch * direction
+        sign * distance * pitch * direction
         for direction in fit.shown(known.outline_uncertainty / 2)
+        for distance in _ELSEWHERE
         for sign in (1.0, -1.0)
     ]
     return [shift for shift in shifts if np.linalg.norm(motion + shift) < most]
