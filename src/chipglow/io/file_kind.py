@@ -9,7 +9,7 @@ from h5py import is_hdf5
 
 from chipglow.io.cameras.formats import camera_formats, find_format
 from chipglow.io.import_file import IMPORT_SOURCES
-from chipglow.io.measurement_file import OwnKind, own_kind
+from chipglow.io.measurement_file import USE_OF_RESULTS, OwnKind, own_kind
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.source import head_of
 from chipglow.text import read_yaml
@@ -45,11 +45,7 @@ _NAMES: Final[Mapping[FileKind, tuple[str, str]]] = {
         "a point spread function",
         "chipglow correct, a study and the page of a measurement take it as PSF",
     ),
-    "analysis": (
-        "results of an analysis",
-        "see report.html beside results.nc, open the folder by chipglow app, or write the scene "
-        "by chipglow cut study.yaml --out scene.nc",
-    ),
+    "analysis": ("results of an analysis", USE_OF_RESULTS),
     "results": ("a folder of results", "chipglow app shows it"),
     "study": ("a study", "chipglow run computes it"),
     "places": ("a file of places", "the commands take it as --regions"),

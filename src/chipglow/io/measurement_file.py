@@ -29,6 +29,12 @@ _VARIABLES: Final[Mapping[OwnKind, frozenset[str]]] = {
 }
 """Variables that only files of a kind have."""
 
+USE_OF_RESULTS: Final = (
+    "see report.html beside results.nc, open the folder by chipglow app, or write the scene by "
+    "chipglow cut study.yaml --out scene.nc"
+)
+"""What an analysis serves for, where a scene is expected."""
+
 
 def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) -> None:
     """Write a measurement to a file: variables, flags and what its attributes state.

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipglow.io import spline_file
 from chipglow.io.atomic import uninterrupted
 from chipglow.io.digest import HDF5Sink, check_file, write_hdf5
-from chipglow.io.measurement_file import own_kind
+from chipglow.io.measurement_file import USE_OF_RESULTS, own_kind
 from chipglow.io.packing import COMPRESSION, chunk_of, read_chunk, rounded
 from chipglow.io.spool import UnfinishedScene, spooled
 from chipglow.scene import (
@@ -366,11 +366,7 @@ def open_scene(path: str | os.PathLike[str]) -> StoredScene:
     path = Path(path)
     results = path / "results.nc" if path.is_dir() else path
     if own_kind(results) == "analysis":
-        raise SceneError(
-            f"{path}: results of an analysis, expected a scene: see report.html beside "
-            "results.nc, open the folder by chipglow app, or write the scene by chipglow cut "
-            "study.yaml --out scene.nc"
-        )
+        raise SceneError(f"{path}: results of an analysis, expected a scene: {USE_OF_RESULTS}")
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such file, expected a scene")
     try:
