@@ -74,12 +74,20 @@ class OutlineFit:
     """The motion of the outlines, from their present position, that the image shows."""
 
     motion: Motion
-    root: Array
-    """Motions in m (turns at `_turn_radius`) of one standard uncertainty each, (3, direction)."""
-    standard_uncertainty: Motion
-
+    covariance: Array
+    """Covariance of the motion to the right, up and of the turn at `turn_radius`, in m²."""
     turn_radius: float
-    """Distance in m at which `root` states turns."""
+    """Distance in m at which `covariance` states turns."""
+
+    @property
+    def root(self) -> Array:
+        """Motions in m of one standard uncertainty each, (3, direction)."""
+        symmetric = (self.covariance + self.covariance.T) / 2
+        return np.asarray(np.linalg.cholesky(symmetric), np.float64)
+
+    @property
+    def standard_uncertainty(self) -> Motion:
+        return Motion(*(np.sqrt(np.diag(self.covariance)) / (1.0, 1.0, self.turn_radius)))
 
     def moves(self, least: float) -> bool:
         """Return whether the outlines move by `least` standard uncertainties or more.
@@ -91,14 +99,14 @@ class OutlineFit:
 
     def shown(self, most: float) -> Array:
         """Return the directions (right, up) in which the standard uncertainty is below `most` m."""
-        variances, directions = np.linalg.eigh((self.root @ self.root.T)[:2, :2])
+        variances, directions = np.linalg.eigh(self.covariance[:2, :2])
         return np.asarray(directions.T[variances < most**2])
 
     def doubted(self, shift: Array) -> "OutlineFit":
         """Return the fit if the outlines may as well be displaced by `shift` (right, up) in m."""
-        covariance = self.root @ self.root.T
+        covariance = self.covariance.copy()
         covariance[:2, :2] += np.outer(shift, shift) / 4
-        return _outline_fit(self.motion, covariance, self.turn_radius)
+        return replace(self, covariance=covariance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,14 +239,7 @@ def fit_outline(posterior: Posterior, known: Knowledge, systematic: LinearErrors
     motion *= known.outline_uncertainty / max(np.abs(motion).max(), known.outline_uncertainty)
     least = _OUTLINE_ERROR * posterior.problem.parts.pixels.spacing
     covariance = covariance[:3, :3] + least**2 * np.eye(3)
-    return _outline_fit(Motion(*(motion * scale)), covariance, turn_radius)
-
-
-def _outline_fit(motion: Motion, covariance: Array, turn_radius: float) -> OutlineFit:
-    """Return the fit of a motion with its covariance in m², turns at their radius."""
-    spread = np.sqrt(np.diag(covariance)) / (1.0, 1.0, turn_radius)
-    root = np.asarray(np.linalg.cholesky((covariance + covariance.T) / 2), np.float64)
-    return OutlineFit(motion, root, Motion(*spread), turn_radius)
+    return OutlineFit(Motion(*(motion * scale)), covariance, turn_radius)
 
 
 def outline_effect(posterior: Posterior, known: Knowledge, fit: OutlineFit | None) -> Effect:
