@@ -3,6 +3,7 @@
 from dataclasses import astuple, replace
 from functools import partial
 
+import numba
 import numpy as np
 import pytest
 import xarray as xr
@@ -306,6 +307,19 @@ def test_the_outline_of_a_heated_chip_is_found_and_does_not_slide_along_itself(o
     assert abs(motion @ normal + off * normal[0]) < 0.05
     # Nothing shows a motion along a straight outline: it stays below its standard uncertainty.
     assert abs(motion @ [normal[1], -normal[0]]) < 0.5
+
+
+def test_any_number_of_threads_gives_the_same_bits():
+    kelvins, emissivity, samples, pixels = scene(12)
+    image = measured(kelvins, emissivity, samples, pixels)
+    before = numba.get_num_threads()
+    results = []
+    for threads in {1, numba.config.NUMBA_NUM_THREADS}:
+        numba.set_num_threads(threads)
+        known = zones(pixels, uncertainty=0.02)
+        results.append(correct(image, CAMERA, known, surroundings=DARK, noise=0.5).data)
+    numba.set_num_threads(before)
+    assert all(one.identical(results[0]) for one in results)
 
 
 def test_a_gap_at_the_outline_does_not_move_it():
