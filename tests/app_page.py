@@ -1,7 +1,6 @@
 """Pages of the app without a browser."""
 
 import time
-from threading import Event
 
 from chipglow.app.opening import open_any
 from chipglow.app.view import PageView
@@ -10,13 +9,11 @@ PATIENCE = 60.0  # s: of a machine with much else to do
 
 
 def shown(path, files=None):
-    """A page of a file whose picture is shown."""
+    """A page of frames whose picture is shown, with its panel."""
     view = PageView(open_any(path), files=files, embedded=True)
     view.start(None)
-    is_shown = Event()
-    view.opened.watch(is_shown.set)
-    view.session.show()
-    assert is_shown.wait(PATIENCE)
+    assert view.opened.images
+    assert view.measuring.panel is not None
     return view
 
 
@@ -25,3 +22,9 @@ def until(is_true):
     while not is_true():
         assert time.monotonic() < end
         time.sleep(0.01)
+
+
+def numbers_html(view, picture, numbers, contributions):
+    """Show the numbers at the cursor, and return them as the page has them."""
+    view._show_numbers(picture, numbers, contributions)
+    return view._messages.pop()["content"]

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from app_page import numbers_html
 from tolerances import DOUBLE
 
 import chipglow
@@ -153,7 +154,7 @@ def test_an_error_image_that_is_zero_everywhere_says_why(model):
 def page_view(opened):
     """A page without a browser, and what it would send there."""
     view, sent = PageView(opened), []
-    view.page._send_msg = sent.append
+    view.page._send_msg = sent.extend
     return view, sent
 
 
@@ -229,11 +230,10 @@ def test_parts_and_contributions_at_the_cursor_sum_to_the_same_error(model, page
     assert found == dict(zip(data.effect.values, one.contribution.values, strict=True))
     # The paths differ in the rounding of single precision.
     assert sum(found.values()) == pytest.approx(numbers["case_1"], abs=1e-3)
-    view, sent = page_view
-    view._show_numbers(picture, numbers, found)
-    assert "A part is the change when its effect is added" in sent[-1]["content"]
+    html = numbers_html(page_view[0], picture, numbers, found)
+    assert "A part is the change when its effect is added" in html
     largest = max(found, key=lambda name: abs(found[name]))
-    assert f"{abs(found[largest]):.1f}" in sent[-1]["content"]
+    assert f"{abs(found[largest]):.1f}" in html
 
 
 @pytest.mark.parametrize(
@@ -246,9 +246,8 @@ def test_parts_and_contributions_at_the_cursor_sum_to_the_same_error(model, page
 def test_contributions_that_are_not_computed_say_why(model, page_view, texts, reason):
     picture = model.picture(model.controls.state_with(model.controls.initial, texts))
     assert model.contributions(picture, lambda: None) == {}
-    view, sent = page_view
-    view._show_numbers(picture, model.numbers(picture), {})
-    assert f"No contributions: {reason}." in sent[-1]["content"]
+    html = numbers_html(page_view[0], picture, model.numbers(picture), {})
+    assert f"No contributions: {reason}." in html
 
 
 def number_shown(html, row):
@@ -262,14 +261,12 @@ def number_shown(html, row):
 def test_the_error_at_the_cursor_is_measured_minus_the_reference_shown(
     model, page_view, reference, noise
 ):
-    view, sent = page_view
     label = REFERENCES[reference].lower()
     for cursor in ("-33.2,288.9", "-150,150"):
         texts = {"analysis.reference": reference, "camera.detector": noise, "cursor": cursor}
         picture = model.picture(model.controls.state_with(model.controls.initial, texts))
         numbers = model.numbers(picture)
-        view._show_numbers(picture, numbers, {})
-        html = sent[-1]["content"]
+        html = numbers_html(page_view[0], picture, numbers, {})
         measured, of_pixel = (number_shown(html, r) for r in ("measured", f"reference: {label}"))
         error = number_shown(html, "error = measured − reference")
         # Rounding of differences of 1000 K.
@@ -312,11 +309,10 @@ def test_a_newer_state_ends_the_picture_and_the_contributions(model):
 
 
 def test_the_uncertainty_is_shown_or_its_absence_explained(model, page_view):
-    view, sent = page_view
     for texts, said in (({}, "No ± without noise"), ({"camera.detector": "noise"}, " ± 0.0")):
         picture = model.picture(model.controls.state_with(model.controls.initial, texts))
-        view._show_numbers(picture, model.numbers(picture), {})
-        assert said in sent[-1]["content"]
+        html = numbers_html(page_view[0], picture, model.numbers(picture), {})
+        assert said in html
 
 
 def test_draws_are_those_of_other_pixels_and_textures(model):

@@ -160,7 +160,7 @@ def test_a_corrected_file_opens_with_its_images_and_bars(picture, tmp_path):
     correction = picture.corrected.correction
     write_correction(correction, tmp_path / "corrected.nc")
     view, sent = PageView(open_any(tmp_path / "corrected.nc")), []
-    view.page._send_msg = sent.append
+    view.page._send_msg = sent.extend
     session = view.session
     session._painted.set()
     session._picture(session.state)

@@ -36,7 +36,7 @@ from chipglow.quantities import ZERO_CELSIUS
 
 pytest.importorskip("panel", reason="needs the extra app")
 import panel as pn
-from app_page import PATIENCE, shown, until
+from app_page import PATIENCE, numbers_html, shown, until
 
 from chipglow.app.asking_page import AskingPage
 from chipglow.app.view import PageView
@@ -283,10 +283,7 @@ def test_a_measurement_is_corrected_as_by_the_library(model, ptw):
 def test_the_page_lists_the_three_largest_contributions(model):
     state = model.controls.state_with(model.controls.initial, CORRECTED)
     picture = model.corrected(model.picture(state), lambda done: None)
-    view, sent = PageView(model), []
-    view.page._send_msg = sent.append
-    view._show_numbers(picture, model.numbers(picture), {})
-    html = sent[-1]["content"]
+    html = numbers_html(PageView(model), picture, model.numbers(picture), {})
     pixel = picture.corrected.at(state.cursor)
     ordered = sorted(pixel.contributions, key=pixel.contributions.get, reverse=True)
     places = [html.index(f">{name.capitalize()}<") for name in ordered[:3]]
@@ -557,6 +554,6 @@ def test_a_scene_has_truth_and_error_next_to_the_correction(scene):
     assert set(CORRECTION_IMAGES) == {"corrected", "half_width", "true", "error"}
     sent = []
     view = PageView(scene)
-    view.page._send_msg = sent.append
+    view.page._send_msg = sent.extend
     view._receive(SimpleNamespace(data={"n": 1, "kind": "cancel", "content": ""}))
     assert sent[-1]["content"]["text"].endswith("was cancelled.")

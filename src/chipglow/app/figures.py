@@ -1,16 +1,21 @@
 """The figures of the page: images with linked ranges and cursors, and temperatures along lines."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import nan
 from typing import Any, Final
 
 import numpy as np
 from bokeh.models import (
     BoxAnnotation,
+    CDSView,
     ColorBar,
     ColumnDataSource,
     CrosshairTool,
     HoverTool,
     Label,
+    Legend,
+    LegendItem,
     LinearColorMapper,
     Range1d,
     Span,
@@ -69,6 +74,24 @@ _SIDE: Final = 180
 """Initial size of a frame in pixels; page.js fits the figures to the page."""
 
 
+@dataclass(frozen=True, eq=False)
+class Overlay:
+    """A glyph that all images draw of the same data.
+
+    They share its models, and it is added as a model: a figure's own methods make one of each
+    state of a selection. A page takes as long to open as it has models.
+    """
+
+    source: ColumnDataSource
+    glyph: Any
+    level: str = "glyph"
+    _view: CDSView = field(init=False, default_factory=CDSView, repr=False)
+
+    def draw_on(self, one: Any) -> Any:
+        """Draw it on a figure and return its renderer."""
+        return one.add_glyph(self.source, self.glyph, view=self._view, level=self.level)
+
+
 class Image:
     """A figure of an image with its colour bar."""
 
@@ -81,16 +104,16 @@ class Image:
             palette=PALETTES[HEAT], low=0.0, high=1.0, nan_color=(0, 0, 0, 0.0)
         )
         self._shown, self._colours = np.zeros(0), HEAT
-        glyph = one.image(
-            **{key: key for key in empty}, source=self.source, color_mapper=self.mapper
-        )
+        names: dict[str, Any] = {key: key for key in empty}
+        image = glyphs.Image(**names, color_mapper=self.mapper)
+        drawn = one.add_glyph(self.source, image)
         self.bar = ColorBar(
             color_mapper=self.mapper, height=10, padding=2, margin=0, background_fill_color=None
         )
         one.add_layout(self.bar, "below")
         tips = [("", "@image{0.0[00]}"), ("x, y", "$x{0.0}, $y{0.0} µm")]
         wheel = WheelZoomTool()
-        one.add_tools(HoverTool(renderers=[glyph], tooltips=tips, attachment="above"), wheel)
+        one.add_tools(HoverTool(renderers=[drawn], tooltips=tips, attachment="above"), wheel)
         one.toolbar.active_scroll = wheel
         one.grid.visible = False
         one.xaxis.ticker.desired_num_ticks = 4  # up to five images stand in a row
@@ -150,32 +173,31 @@ class Line:
         one.add_layout(Span(dimension="height", line_color=colour, line_width=3, location=0))
         for mark in (self.under_range, self.face, self.face_label):
             one.add_layout(mark)
-        self.shade = one.varea(
-            "along", "low", "high", source=self.band, fill_alpha=0.25, color=_MEASURED
-        )
-        looks = {
+        shade = glyphs.VArea(x="along", y1="low", y2="high", fill_color=_MEASURED, fill_alpha=0.25)
+        self.shade = one.add_glyph(self.band, shade)
+        looks: dict[str, dict[str, Any]] = {
             "reference": {"line_dash": "dashed", "line_color": _REFERENCE},
             "measured": {"line_color": _MEASURED},
+            "corrected": {"line_color": _CORRECTED},
         }
-        drawn = [
-            one.line("along", key, source=source, line_width=2, legend_label=key, **looks[key])
-            for key in reversed(curves)
-        ]
-        self.corrected = one.line(
-            "along", "corrected", source=source, line_width=2, legend_label="corrected",
-            line_color=_CORRECTED, visible=False,
+        drawn = {
+            key: one.add_glyph(source, glyphs.Line(x="along", y=key, line_width=2, **looks[key]))
+            for key in (*reversed(curves), "corrected")
+        }
+        items = {
+            key: LegendItem(label={"value": key}, renderers=[curve]) for key, curve in drawn.items()
+        }
+        self.corrected, self.corrected_item = drawn["corrected"], items["corrected"]
+        self.corrected.visible = self.corrected_item.visible = False
+        self.reference_item, self.measured_item = items.get("reference"), items["measured"]
+        self.legend = Legend(
+            items=list(items.values()), orientation="horizontal", padding=0, margin=0, spacing=10,
+            glyph_height=12, label_text_font_size="11px", border_line_color=None,
+            background_fill_color=None,
         )  # fmt: skip
+        one.add_layout(self.legend, "above")
         tips = [("distance", "@along{0.0} µm"), *((key, f"@{key}{{0.0}} °C") for key in curves)]
-        one.legend[0].update(
-            orientation="horizontal", padding=0, margin=0, spacing=10, glyph_height=12,
-            label_text_font_size="11px", border_line_color=None, background_fill_color=None,
-        )  # fmt: skip
-        *others, self.corrected_item = one.legend[0].items
-        self.reference_item = others[0] if with_reference else None
-        self.measured_item = others[-1]
-        self.corrected_item.visible = False
-        one.add_layout(one.legend[0], "above")
-        one.add_tools(HoverTool(tooltips=tips, mode="vline", renderers=drawn[-1:]))
+        one.add_tools(HoverTool(tooltips=tips, mode="vline", renderers=[drawn["measured"]]))
         one.x_range.range_padding = 0.02  # of the range on each side
         one.xaxis.axis_label = "distance / µm"
         one.yaxis.axis_label = "temperature / °C"
@@ -228,18 +250,16 @@ class Figures:
             for name, where in along.items()
         }
         self.all = {name: one.figure for name, one in (self.images | self.lines).items()}
-        places = {
-            name: ColumnDataSource({"x": [], "y": []}, name=name) for name in (*LINES, CURSOR)
-        }
         # Above the images, which a move of the pointer does not paint again, nor tell Python.
         spans = [
             Span(dimension=one, line_color="#808080", line_width=1, level="overlay", syncable=False)
             for one in ("height", "width")
         ]
-        outline = [] if tool is None else (MICRONS * tool.outline(DRAWN_FACE).T).tolist()
+        overlays = [*_tool_overlay(tool), *_place_overlays()]
         for one in self.images.values():
             one.figure.add_tools(CrosshairTool(overlay=spans))
-            _draw_over(one.figure, outline, places)
+            for overlay in overlays:
+                overlay.draw_on(one.figure)
         self.set_theme("light")
 
     def show(self, picture: Picture) -> None:
@@ -269,7 +289,7 @@ class Figures:
         for image in self.images.values():
             image.bar.major_label_text_color = text
         for line in self.lines.values():
-            line.figure.legend[0].label_text_color = text
+            line.legend.label_text_color = text
 
 
 def _figure(name: str, title: str, height: int, **given: Any) -> Any:
@@ -283,22 +303,33 @@ def _figure(name: str, title: str, height: int, **given: Any) -> Any:
     return one
 
 
-def _draw_over(one: Any, outline: list[list[float]], places: dict[str, ColumnDataSource]) -> None:
-    """Draw tool, lines and cursor in two widths (pixels) and colours, to be seen on any ground.
+def _tool_overlay(tool: Tool | None) -> list[Overlay]:
+    """Return the outline of the tool, if there is one."""
+    if tool is None:
+        return []
+    x, y = (MICRONS * tool.outline(DRAWN_FACE).T).tolist()
+    rows = {"xs": [x, x], "ys": [y, y], "colour": ["white", "black"], "width": [2.4, 1.2]}
+    return [Overlay(ColumnDataSource(rows), outlined())]
 
-    As glyphs, each of which is one model; the methods of a figure make three.
+
+def _place_overlays() -> list[Overlay]:
+    """Return lines, their ends and the cursor, which page.js places.
+
+    All are drawn in two widths (pixels) and colours, to be seen on any ground.
     """
-    if outline:
-        source = ColumnDataSource(dict(zip("xy", outline, strict=True)))
-        for colour, width in (("white", 2.4), ("black", 1.2)):
-            one.add_glyph(source, glyphs.Line(line_color=colour, line_width=width))
-    for name in LINES:
-        for colour, width in (("black", 3.4), (LINE_COLOURS[name], 1.8)):
-            one.add_glyph(places[name], glyphs.Line(line_color=colour, line_width=width))
-        ends = glyphs.Scatter(
-            size=9, line_color="black", fill_color=LINE_COLOURS[name], line_width=1.2
-        )
-        one.add_glyph(places[name], ends)
-    for colour, width in (("black", 4.0), ("white", 1.8)):
-        cross = glyphs.Scatter(marker="cross", size=15, line_color=colour, line_width=width)
-        one.add_glyph(places[CURSOR], cross, level="overlay")
+    colours = list(LINE_COLOURS.values())
+    nowhere: dict[str, list[Any]] = {"xs": [[]] * 4, "ys": [[]] * 4}
+    halves = {"colour": ["black", "black", *colours], "width": [3.4, 3.4, 1.8, 1.8]}
+    lines = ColumnDataSource(nowhere | halves, name="lines")
+    unknown = {"x": [nan] * 4, "y": [nan] * 4}
+    ends = ColumnDataSource(unknown | {"colour": np.repeat(colours, 2).tolist()}, name="ends")
+    crosses = {"x": [nan] * 2, "y": [nan] * 2, "colour": ["black", "white"], "width": [4.0, 1.8]}
+    cursor = ColumnDataSource(crosses, name=CURSOR)
+    end = glyphs.Scatter(size=9, line_color="black", fill_color="colour", line_width=1.2)
+    cross = glyphs.Scatter(marker="cross", size=15, line_color="colour", line_width="width")
+    return [Overlay(lines, outlined()), Overlay(ends, end), Overlay(cursor, cross, "overlay")]
+
+
+def outlined() -> glyphs.MultiLine:
+    """Return lines with a colour and a width each."""
+    return glyphs.MultiLine(line_color="colour", line_width="width")

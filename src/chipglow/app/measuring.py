@@ -127,11 +127,30 @@ class Measuring:
             opened.figures, self._add, self._move, self._remove, self._hint_at
         )
         self._work = Newest(self._read_curves, self._failed)
-        self._build()
+        self._hint = pn.pane.HTML(_HINTS["look"], margin=2)
+        self.tools = pn.Column(margin=0)
+        self._panel: pn.Column | None = None
+        self._figures: tuple[Any, ...] = ()
+        self._theme = "light"
         opened.watch(self._show_picture)
+
+    @property
+    def panel(self) -> pn.Column:
+        """Table, curves, limits and files; built with the tools when first asked for.
+
+        They take as long as the images, which are shown before.
+        """
+        if self._panel is None:
+            self._panel = self._build()
+            self._drawn.add_tools()
+            self.tools.append(pn.pane.Bokeh(self._drawn.choice, margin=0))
+            self.set_theme(self._theme)
+            self._show_places()
+        return self._panel
 
     def set_theme(self, theme: str) -> None:
         """Set the colours of the curves' text."""
+        self._theme = theme
         for one in self._figures:
             one.title.text_color = TEXT[theme]
             one.axis.axis_label_text_color = one.axis.major_label_text_color = TEXT[theme]
@@ -141,14 +160,7 @@ class Measuring:
         """Show the places and the view of a file; ValueError for a place outside the image."""
         self._marks = list(marks_of(described, self._opened.frames.raster))
         self._know(self._regions())
-        view = described.view
-        for widget, kelvins in (
-            (self._low, view.low),
-            (self._high, view.high),
-            (self._isotherm, view.isotherm),
-        ):
-            widget.value = None if kelvins is None else round(kelvins - ZERO_CELSIUS, 6)
-        self._palette.value = view.palette
+        self._view = described.view
 
     def end(self) -> None:
         """Stop reading for a page that was closed."""
@@ -231,6 +243,8 @@ class Measuring:
         if not self._reader.is_ready:
             return
         self._drawn.show(self._marks)
+        if self._panel is None:
+            return
         self._show_table()
         self._show_lines()
         self._show_histogram()
@@ -417,18 +431,17 @@ class Measuring:
 
     # Widgets
 
-    def _build(self) -> None:
-        """Make the widgets and figures of the panel."""
+    def _build(self) -> pn.Column:
+        """Return the panel with its widgets and figures."""
         self._rows = _table_widget()
         # Panel calls these without the lock of the document, which changes of it need.
         self._rows.on_edit(self._on_edit)
         self._rows.on_click(lambda event: self._remove(event.row), column="delete")
         self._rows.param.watch(lambda _: self._later(self._show_histogram), "selection")
-        self._hint = pn.pane.HTML(_HINTS["look"], margin=2)
         self._warnings = pn.pane.HTML("", visible=False)
-        self._low = _number("Colours from / °C")
-        self._high = _number("to / °C")
-        self._isotherm = _number("Isotherm / °C")
+        self._low = _celsius("Colours from / °C", self._view.low)
+        self._high = _celsius("to / °C", self._view.high)
+        self._isotherm = _celsius("Isotherm / °C", self._view.isotherm)
         options = {label: name for name, label in _LABELS.items()}
         self._palette = pn.widgets.Select(
             label="Palette", options=options, value=self._view.palette, width=130
@@ -439,8 +452,7 @@ class Measuring:
         self._compute.on_click(lambda _: self._work.ask(tuple(self._marks)))
         self._copied = ColumnDataSource({"text": [""]})
         self._build_figures()
-        self.tools = pn.pane.Bokeh(self._drawn.choice, margin=0)
-        self.panel = pn.Column(
+        return pn.Column(
             self._hint,
             self._rows,
             self._warnings,
@@ -495,7 +507,9 @@ def _mapper(one: Any) -> LinearColorMapper:
     return one.renderers[0].glyph.color_mapper  # a search of the figure's models takes long
 
 
-def _number(name: str, value: float | None = None) -> Any:
+def _celsius(name: str, kelvins: float | None) -> Any:
+    """Return a field of a temperature in °C, which may be empty."""
+    value = None if kelvins is None else round(kelvins - ZERO_CELSIUS, 6)
     return pn.widgets.FloatInput(label=name, value=value, width=110)
 
 

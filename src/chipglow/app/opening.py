@@ -259,10 +259,13 @@ class OpenFiles:
     def warm(self) -> None:
         """Prepare to open a file, so that the first one takes no longer than others."""
         import_module("pandas.io.formats.style")  # of the table; it imports Matplotlib
+        import_module("dask.array")  # xarray imports it for the first dataset
         with self.process.used():
             Sandbox("reader").answer(load_libraries)
         band = Study().camera.build().band
         band.temperature(band.radiance(np.full((2, 2), 600.0)))  # K: loads compiled kernels
+        raster = Raster(0.0, 1e-6, 1e-6, 2, 2)  # m
+        Controls.of_measurement(Study(), np.zeros(1), raster, has_tool=False)  # reads the schema
 
     def find(self, key: str) -> Model | Asking | None:
         """Return an open file by its key; None if it is not open."""

@@ -59,7 +59,7 @@ export function render({ view, model, el }) {
   for (const box of page.querySelectorAll("[data-path]")) {
     const path = box.dataset.path, stops = spec.stops[path] ?? [];
     const field = box.querySelector("select, input[type=text]"), slider = box.querySelector("input[type=range]");
-    const entry = { box, field, slider, stops, sent: 0, text: "", drawn: "", typing: false };
+    const entry = { box, field, slider, stops, sent: 0, text: "", typing: false };
     controls.set(path, entry);
     // A text that is being typed stays, whatever comes from Python meanwhile.
     field.addEventListener("input", () => { entry.typing = field.type === "text"; });
@@ -103,12 +103,24 @@ export function render({ view, model, el }) {
   // Places on the images: the cursor, the lines and the view are dragged; a click sets the cursor.
 
   const points = (name) => controls.get(name).text.split(";").map((one) => one.split(",").map(Number));
+  const drawn = { rake_line: [], band_line: [], cursor: [] };
+  const axes = (places) => [0, 1].map((axis) => places.map((one) => one[axis]));
+  function draw(name, columns) {
+    const source = named(name);
+    source?.setv({ data: { ...source.data, ...columns } }, { sync: false });
+  }
   function setPlaces(name, places) {
-    const entry = controls.get(name), now = String(places);
-    if (entry.drawn === now) return; // each change paints all images again
-    entry.drawn = now;
-    const [x, y] = [0, 1].map((axis) => places.map((one) => one[axis]));
-    named(name)?.setv({ data: { x, y } }, { sync: false });
+    if (String(drawn[name]) === String(places)) return; // each change paints all images again
+    drawn[name] = places;
+    if (name === "cursor") {
+      const [x, y] = axes([...places, ...places]); // each with a halo
+      return draw("cursor", { x, y });
+    }
+    const lines = [drawn.rake_line, drawn.band_line];
+    if (lines.some((line) => line.length === 0)) return; // the other one follows
+    const [xs, ys] = axes([...lines, ...lines].map(axes)), [x, y] = axes(lines.flat());
+    draw("lines", { xs, ys });
+    draw("ends", { x, y });
   }
   function clamped(x, y) {
     return [Math.min(Math.max(x, extent[0]), extent[1]), Math.min(Math.max(y, extent[2]), extent[3])];
@@ -163,7 +175,9 @@ export function render({ view, model, el }) {
       for (const [kind, handler] of Object.entries(handlers)) removeEventListener(kind, handler);
       move(event); // of a busy page it may be the first to come
       if (!dragged && event.type === "pointerup") {
-        change("cursor", clamped(...start).map((value) => value.toFixed(1)).join(","), true);
+        const at = clamped(...start).map((value) => Number(value.toFixed(1)));
+        setPlaces("cursor", [at]);
+        change("cursor", at.join(","), true);
       } else if (held && text) change(held.name, text, true);
     };
     const handlers = { pointermove: move, pointerup: up, pointercancel: up };
@@ -208,10 +222,16 @@ export function render({ view, model, el }) {
     }
     find("#undo").disabled = !can_undo;
     find("#redo").disabled = !can_redo;
-    if (!spec.embedded) {
-      const query = new URLSearchParams(link).toString();
-      afterPaint(() => history.replaceState(null, "", query ? `?${query}` : location.pathname));
-    }
+    if (spec.embedded) return;
+    const query = new URLSearchParams(link).toString();
+    address = query ? `?${query}` : location.pathname;
+    clearTimeout(addressing);
+    addressing = setTimeout(showAddress, 500); // ms; at each change a browser loads the icon again
+  }
+  let address = "", addressing = 0;
+  function showAddress() {
+    clearTimeout(addressing);
+    history.replaceState(null, "", address);
   }
 
   // Without a number the progress bar says only that something is being done.
@@ -313,6 +333,7 @@ export function render({ view, model, el }) {
   // Files, links, theme and size.
 
   each("#link", "click", async () => {
+    showAddress();
     const text = location.href;
     const copied = await navigator.clipboard?.writeText(text).then(() => true, () => false);
     find("#status").textContent = copied ? "The link is copied." : text;
@@ -390,7 +411,7 @@ export function render({ view, model, el }) {
   }
   const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture,
     chip: (url) => { find(".chip img").src = url; }, open: (key) => { location.search = `?open=${key}`; } };
-  model.on("msg:custom", ({ kind, content }) => shows[kind](content));
+  model.on("msg:custom", (messages) => messages.forEach(({ kind, content }) => shows[kind](content)));
   find(".images").addEventListener("pointerdown", grip);
   const watcher = new ResizeObserver(refit);
   model.on("after_render", () => {

@@ -17,7 +17,7 @@ from bokeh.models import (
     glyphs,
 )
 
-from chipglow.app.figures import MICRONS
+from chipglow.app.figures import MICRONS, Overlay, outlined
 from chipglow.app.marks import Kind, Mark
 from chipglow.drawing.scales import COLOURS
 from chipglow.scene.regions import Point
@@ -25,10 +25,16 @@ from chipglow.scene.regions import Point
 _TOOLS: Final[tuple[str, ...]] = ("look", *get_args(Kind), "edit")
 """Effect of a press on an image: move cursor and view, draw a place, or edit one."""
 
+_SAME: Final = {"circle": "box"}
+"""A circle is drawn by a box about its centre."""
+
 _ACTIVATE: Final = """
 const chosen = cb_obj.active;
 groups.forEach((group, i) => { if (i !== chosen) for (const tool of group) tool.active = false; });
-for (const tool of groups[chosen]) tool.active = true;
+for (const tool of groups[chosen]) {
+  if ("origin" in tool) tool.origin = chosen === circle ? "center" : "corner";
+  tool.active = true;
+}
 """
 """Makes the tools of a choice the active ones of all figures."""
 
@@ -52,7 +58,9 @@ class DrawnPlaces:
         chosen: Callable[[str], None],
     ) -> None:
         self._drawn, self._moved, self._removed = drawn, moved, removed
-        self._outlines = ColumnDataSource({"xs": [], "ys": [], "colour": []}, name="outlines")
+        self._outlines = ColumnDataSource(
+            {"xs": [], "ys": [], "colour": [], "width": []}, name="outlines"
+        )
         self._labels = ColumnDataSource({"x": [], "y": [], "name": [], "colour": []})
         self._handles = ColumnDataSource(
             {"x": [], "y": [], "colour": [], "mark": [], "handle": []}, name="handles"
@@ -61,13 +69,14 @@ class DrawnPlaces:
         self._points = ColumnDataSource({"x": [], "y": []})
         self._strokes = ColumnDataSource({"xs": [], "ys": []})
         self.isotherm = ColumnDataSource({"xs": [], "ys": []}, name="isotherm")
-        groups: list[list[Any]] = [[] for _ in _TOOLS]
-        for one in figures.values():
-            tools = self._draw_on(one)
-            for group, tool in zip(groups[1:], tools, strict=True):
-                group.append(tool)
-                one.add_tools(tool)
-            # None of them is active before it is chosen: a press moves cursor and view.
+        dashed = glyphs.MultiLine(line_color="white", line_width=1.6, line_dash="4 2")
+        overlays = Overlay(self._outlines, outlined()), Overlay(self.isotherm, dashed)
+        self._figures = list(figures.values())
+        for one in self._figures:
+            for overlay in overlays:
+                overlay.draw_on(one)
+            one.add_layout(self._names())
+            # No tool is active before it is chosen: a press moves cursor and view.
             one.toolbar.update(active_drag=None, active_tap=None)
             one.on_event(SelectionGeometry, self._on_geometry)
         self._handles.on_change("data", self._on_handles)
@@ -76,17 +85,31 @@ class DrawnPlaces:
         labels = [name.capitalize() for name in _TOOLS]
         self.choice = RadioButtonGroup(labels=labels, active=0, stylesheets=[_BUTTONS])
         self.choice.on_change("active", lambda attr, old, new: chosen(self._kind))
-        self.choice.js_on_change("active", CustomJS(args={"groups": groups}, code=_ACTIVATE))
+
+    def add_tools(self) -> None:
+        """Add the tools to the figures, whose images may be shown before."""
+        overlays = self._overlays()
+        groups: list[list[Any]] = [[] for _ in _TOOLS]
+        for one in self._figures:
+            tools = self._tools({name: overlay.draw_on(one) for name, overlay in overlays.items()})
+            one.add_tools(*tools.values())
+            for group, name in zip(groups[1:], _TOOLS[1:], strict=True):
+                group.append(tools[_SAME.get(name, name)])
+        args = {"groups": groups, "circle": _TOOLS.index("circle")}
+        self.choice.js_on_change("active", CustomJS(args=args, code=_ACTIVATE))
 
     def show(self, marks: Sequence[Mark]) -> None:
         """Show the outlines, names and handles of places."""
         colours = [colour_of(number) for number in range(len(marks))]
         outlines = [MICRONS * mark.outline.T for mark in marks]
         firsts = [outline[:, 0].tolist() for outline in outlines]
+        x, y = ([outline[axis].tolist() for outline in outlines] for axis in (0, 1))
+        count = len(marks)
         self._outlines.data = {
-            "xs": [x.tolist() for x, _ in outlines],
-            "ys": [y.tolist() for _, y in outlines],
-            "colour": colours,
+            "xs": 2 * x,
+            "ys": 2 * y,
+            "colour": count * ["black"] + colours,
+            "width": count * [3.4] + count * [1.8],
         }
         self._labels.data = {
             "x": [x for x, _ in firsts],
@@ -104,32 +127,32 @@ class DrawnPlaces:
         self._shown = {name: list(one) for name, one in zip(names, columns, strict=True)}
         self._handles.data = self._shown
 
-    def _draw_on(self, one: Any) -> list[Any]:
-        """Draw the places on a figure, and return its tools in the order of the choices."""
-        for colour, width in (("black", 3.4), ("colour", 1.8)):
-            outlines = glyphs.MultiLine(line_color=colour, line_width=width)
-            one.add_glyph(self._outlines, outlines)
-        dashed = glyphs.MultiLine(line_color="white", line_width=1.6, line_dash="4 2")
-        one.add_glyph(self.isotherm, dashed)
-        one.add_layout(
-            LabelSet(
-                x="x", y="y", text="name", source=self._labels, x_offset=4, y_offset=4,
-                text_font_size="11px", text_color="white", background_fill_color="#16191d",
-                background_fill_alpha=0.6,
-            )
+    def _names(self) -> LabelSet:
+        """Return the names of the places for a figure."""
+        return LabelSet(
+            x="x", y="y", text="name", source=self._labels, x_offset=4, y_offset=4,
+            text_font_size="11px", text_color="white", background_fill_color="#16191d",
+            background_fill_alpha=0.6,
         )  # fmt: skip
+
+    def _overlays(self) -> dict[str, Overlay]:
+        """Return what the tools draw or edit, by their names."""
         handle = glyphs.Scatter(size=9, fill_color="colour", line_color="black")
-        handles = one.add_glyph(self._handles, handle)
-        points = one.add_glyph(self._points, glyphs.Scatter(size=9))
-        strokes = one.add_glyph(self._strokes, glyphs.MultiLine(line_color="white"))
-        return [
-            PointDrawTool(renderers=[points], drag=False),
-            FreehandDrawTool(renderers=[strokes]),
-            BoxSelectTool(renderers=[], persistent=False),
-            BoxSelectTool(renderers=[], persistent=False, origin="center"),
-            PolySelectTool(renderers=[], persistent=False),
-            PointDrawTool(renderers=[handles], add=False),
-        ]
+        return {
+            "point": Overlay(self._points, glyphs.Scatter(size=9)),
+            "line": Overlay(self._strokes, glyphs.MultiLine(line_color="white")),
+            "edit": Overlay(self._handles, handle),
+        }
+
+    def _tools(self, drawn: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the tools of a figure by their names; `drawn` has what they draw or edit."""
+        return {
+            "point": PointDrawTool(renderers=[drawn["point"]], drag=False),
+            "line": FreehandDrawTool(renderers=[drawn["line"]]),
+            "box": BoxSelectTool(renderers=[], persistent=False),
+            "polygon": PolySelectTool(renderers=[], persistent=False),
+            "edit": PointDrawTool(renderers=[drawn["edit"]], add=False),
+        }
 
     def _on_geometry(self, event: SelectionGeometry) -> None:
         """Take a box, a circle about the middle of a box, or a polygon."""

@@ -113,6 +113,7 @@ class PageView:
         self._began = 0.0
         self._picture: Picture | None = None
         self._lines: dict[str, dict[str, Array]] = {}
+        self._messages: list[dict[str, Any]] = []
         try:
             if opened.places is not None:
                 self.measuring.restore(opened.places)
@@ -133,11 +134,18 @@ class PageView:
         self.page.on_msg(self._receive)
 
     def start(self, document: Document | None) -> None:
-        """Set the document in which results of other threads are shown; None for a notebook."""
+        """Set the document in which results of other threads are shown; None for a notebook.
+
+        A frame of a file is drawn at once, so that the browser has it with the page.
+        """
         self._document = document
         if document is None:
             with suppress(RuntimeError):  # not in a notebook's kernel: nothing shows the page
                 self._loop = get_running_loop()
+        model = self.session.model
+        if not isinstance(model, SceneModel):
+            with suppress(ValueError, OSError):  # stated when the page is ready
+                self._draw(model.picture(self.session.state))
 
     def end(self) -> None:
         """End the work for a page that was closed."""
@@ -191,12 +199,15 @@ class PageView:
         self._later(lambda: getattr(self, f"_show_{kind}")(*content))
 
     def _reported(self, act: Callable[[], None]) -> None:
-        """Do something; a failure is shown on the page."""
+        """Do something and send its messages as one; a failure is shown on the page."""
         try:
             act()
         except Exception as error:  # a defect: it must not leave the page waiting
             _log.exception("chipglow app")
             self._say(f"Defect: {type(error).__name__}: {error}", "error")
+        if self._messages:
+            messages, self._messages = self._messages, []
+            self.page._send_msg(messages)
 
     def _on_ready(self, _: None) -> None:
         """Fill a page that has just been rendered, and compute its picture."""
@@ -286,17 +297,7 @@ class PageView:
     def _show_picture(
         self, number: int, picture: Picture, numbers: dict[str, float] | None = None
     ) -> None:
-        self._picture = picture
-        self.figures.show(picture)
-        if not picture.quick:
-            model = self.session.model
-            state = picture.state
-            measured = model.measurement_of(picture)
-            stored = model.controls.emissivities(state.study)
-            if isinstance(model, MeasurementModel):
-                uploads = None if self._files is None else self._files.folder
-                self.opened.correction = correction_data(state.study, stored, uploads)
-            self.opened.show(picture, model.frames(state), model.frame(state), measured, stored)
+        self._draw(picture)
         self._say(*self._described(picture))
         # The page draws the curves after the images: that halves the time to the images.
         content = {"number": number, "lines": self._changed_lines(picture)}
@@ -305,6 +306,20 @@ class PageView:
         self._send("picture", content | {"quick": picture.quick})
         if numbers is not None:
             self._show_numbers(picture, numbers, {})
+
+    def _draw(self, picture: Picture) -> None:
+        """Draw a picture in the figures; places are read in an exact one."""
+        self._picture = picture
+        self.figures.show(picture)
+        if picture.quick:
+            return
+        model, state = self.session.model, picture.state
+        measured = model.measurement_of(picture)
+        stored = model.controls.emissivities(state.study)
+        if isinstance(model, MeasurementModel):
+            uploads = None if self._files is None else self._files.folder
+            self.opened.correction = correction_data(state.study, stored, uploads)
+        self.opened.show(picture, model.frames(state), model.frame(state), measured, stored)
 
     def _changed_lines(self, picture: Picture) -> dict[str, dict[str, Array]]:
         """Return the curves that the page does not have: the cursor changes none of them."""
@@ -352,10 +367,9 @@ class PageView:
     ) -> None:
         x, y = picture.state.cursor
         parts = {name: numbers[name] for name in (*PARTS, "texture") if name in numbers}
-        template = _TEMPLATES.get_template("numbers.html")
         corrected = picture.corrected and picture.corrected.at(picture.state.cursor)
         largest = _largest(corrected.contributions) if corrected else {}
-        html = template.render(
+        html = _NUMBERS.render(
             numbers=numbers,
             texts=_texts(numbers),
             reference=picture.reference,
@@ -400,7 +414,7 @@ class PageView:
         self._say("Drawing phases and textures.", "busy", progress=done)
 
     def _send(self, kind: str, content: Any) -> None:
-        self.page._send_msg({"kind": kind, "content": content})
+        self._messages.append({"kind": kind, "content": content})
 
     def _say(self, text: str, kind: str = "", **more: Any) -> None:
         self._send("status", {"text": readable(text), "kind": kind, **more})
@@ -499,7 +513,7 @@ def _html(opened: Model, figures: Figures, may_upload: bool, embedded: bool) -> 
         "view": max(_VIEW_WIDTH, 1e6 * _VIEW_SAMPLES * opened.raster.spacing),
         "shape": (top - bottom) / (right - left),
     }
-    return _TEMPLATES.get_template("page.html").render(
+    return _PAGE.render(
         spec=spec,
         name=opened.name,
         scene=opened.scene if isinstance(opened, SceneModel) else None,
@@ -560,3 +574,5 @@ _TEMPLATES: Final = Environment(
     loader=PackageLoader("chipglow.app"), autoescape=True, trim_blocks=True, lstrip_blocks=True
 )
 _TEMPLATES.filters |= {"celsius": _celsius, "kelvins": _kelvins, "rounded": rounded_text}
+_PAGE: Final = _TEMPLATES.get_template("page.html")
+_NUMBERS: Final = _TEMPLATES.get_template("numbers.html")
