@@ -418,6 +418,31 @@ def test_a_dropped_emissivity_file_gives_the_temperatures_of_the_commands(small,
     again.end()
 
 
+def test_the_rest_of_an_image_has_an_emissivity_of_the_file_by_its_name(small, files):
+    (small / "heated.yaml").write_text(
+        "regions:\n"
+        "  middle: {rectangle: [[240 um, 190 um], [276 um, 228 um]]}\n"
+        "  side: {rectangle: [[204 um, 190 um], [234 um, 222 um]]}\n"
+    )
+    view, read = by_file(small, files), Event()
+    session, texts = view.session, {"camera.psf": "file", "psf_file": "psf.nc"}
+    with pytest.raises(ValueError, match=r"^Elsewhere: 'nose' has no emissivity; known are middle"):
+        session.change({"elsewhere": "nose"})
+    view.opened.watch(lambda: view.opened.corrected is None or read.set())
+    session.change(texts | {"corrected_part": "whole", "elsewhere": "side"})
+    assert read.wait(PATIENCE)
+    (small / "session.yaml").write_text(text := view.measuring._session_text())
+    found = view._picture.corrected.correction
+    view.end()
+    assert "elsewhere: side\n" in text
+    assert np.isfinite(found.data["temperature"]).all()  # not only in the region
+    run("correct", "chip.nc", "--regions", "session.yaml", "--out", "corrected.nc")
+    check_alike(found.data, read_correction("corrected.nc").data)
+    again = shown(small / "session.yaml")
+    assert again.session.state.study.elsewhere == "side"
+    again.end()
+
+
 def test_the_table_has_the_emissivity_of_a_file_until_the_user_states_another(small, files):
     (small / "heated.yaml").write_text(
         "regions: {middle: {rectangle: [[240 um, 190 um], [276 um, 228 um]]}}\n"
@@ -450,7 +475,7 @@ def test_the_page_says_which_names_an_emissivity_file_has(small, files):
     )
     view = by_file(small, files)
     assert view.session.state.study.emissivity_file.endswith("/emissivity.nc")
-    needs = "the emissivity or a region with a name of its file (side)"
+    needs = "the emissivity, a region or Elsewhere with a name of its file (side)"
     assert view.session.model.needs(view.session.state).startswith(needs)
     view._open(("psf.nc", knife_file(small)))
     assert view.session.state.study.psf_source == "file"

@@ -213,6 +213,9 @@ BAD = {
     "lines: {a: [[1, 2], [1, 2]]}": "two corners are the same",
     "lines: {a: [[1, 2], [1 um, 2 um]]}": "lines.a: pixels and lengths are mixed",
     "{points: {a: [1, 2]}, lines: {a: [[1, 2], [3, 4]]}}": "two places have this name",
+    "{points: {a: [1, 2]}, emissivities: {elsewhere: {mean: 0.5}}, elsewhere: b}": (
+        "elsewhere: 'emissivities' has a number"
+    ),
     "{points: {a: [1, 2]}, emissivities: {b: {mean: 0.5}}}": "'b' is no place or feature",
     "{points: {a: [1, 2]}, emissivities: {a: {mean: 1.5}}}": "emissivities.a.mean",
     "{points: {a: [1, 2]}, view: {low: 9 degC, high: 8 degC}}": "low: 9 degC is not below high",

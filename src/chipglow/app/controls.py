@@ -96,7 +96,7 @@ REFLECTED: Final = "293 K"
 """Reflected temperature of a measurement: the default of `chipglow.correct`."""
 
 CORRECTING: Final = (
-    "emissivity", "camera.psf", "camera.reflected", "corrected_part", "psf_", "tool",
+    "emissivity", "elsewhere", "camera.psf", "camera.reflected", "corrected_part", "psf_", "tool",
     "outline_uncertainty", "reflected_uncertainty",
 )  # fmt: skip
 """Beginnings of the paths of controls on which the correction of a measurement depends."""
@@ -158,6 +158,9 @@ class ShownStudy(Study):
     ] = None
     emissivity_file: Annotated[
         str | None, Parameter("Emissivities of places by name, output of chipglow emissivity.")
+    ] = None
+    elsewhere: Annotated[
+        str | None, Parameter("Name of the emissivity outside the regions in that file.")
     ] = None
     edited: Annotated[str, Parameter("Camera that the controls change.")] = "first"
     set_emissivity: Annotated[
@@ -346,6 +349,7 @@ _CORRECTED: Final = (
         is_text=True,
         hint="file of chipglow emissivity",
     ),
+    Control("elsewhere", "Elsewhere", "Correction", is_text=True, hint="none, or a name of it"),
     Control("tool", "Tool", "Correction", is_text=True, hint="none, found, or a file"),
     Control("tool_emissivity", "Tool, emissivity", "Correction", 0.05),
     Control("tool_emissivity_uncertainty", "Tool, its u (k = 1)", "Correction", 0.0, 0.1, 0.005),
@@ -486,6 +490,8 @@ class Controls:
         """Return whether a control of a correction has an effect, by the other ones."""
         if path.startswith("tool_"):
             return self.has_tool or study.tool is not None
+        if path == "elsewhere":
+            return study.emissivity_file is not None and study.emissivity is None
         return path != "psf_file" or study.psf_source == PSF_FILE
 
     def ranges(self, state: State) -> dict[str, list[float]]:
@@ -590,12 +596,20 @@ class Controls:
             if "emissivity_file" in texts and study.emissivity_file is not None:
                 file = study.emissivity_file
                 self._emissivities[file] = StoredEmissivities.read(file)
+            self._check_elsewhere(study)
             if "tool" in texts and study.tool not in (None, FOUND):
                 load_tool(str(study.tool))
         except OSError as error:
             is_of_system = error.filename is not None
             message = f"{error.filename}: {error.strerror}" if is_of_system else str(error)
             raise ValueError(message) from None
+
+    def _check_elsewhere(self, study: ShownStudy) -> None:
+        """Raise a ValueError if the emissivity outside the regions is not in the file."""
+        stored = self.emissivities(study)
+        if stored is not None and study.elsewhere not in (None, *stored.lines):
+            known = ", ".join(stored.lines)
+            raise ValueError(f"elsewhere: {study.elsewhere!r} has no emissivity; known are {known}")
 
     def emissivities(self, study: ShownStudy) -> StoredEmissivities | None:
         """Return the emissivities of the file that a state names, as they were at that time."""

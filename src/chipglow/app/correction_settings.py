@@ -43,6 +43,8 @@ def correction_data(
         data["emissivities"] = emissivities
     if study.emissivity_file is not None:
         data["emissivity_file"] = named(study.emissivity_file)
+        if study.elsewhere is not None and study.emissivity is None:
+            data["elsewhere"] = study.elsewhere
     if study.psf_file is not None and study.psf_source == PSF_FILE:
         data["psf"] = {"kind": "measured", "file": named(study.psf_file)}
     elif study.camera.psf is not None:
@@ -76,6 +78,8 @@ def correction_texts(places: PlacesDescription) -> dict[str, str]:
             texts[f"{control}_uncertainty"] = f"{known.uncertainty:.10g}"
     if places.emissivity_file is not None:
         texts["emissivity_file"] = places.emissivity_file
+    if places.elsewhere is not None:
+        texts["elsewhere"] = places.elsewhere
     if isinstance(places.psf, MeasuredPSFFile):
         texts |= {"camera.psf": PSF_FILE, "psf_file": places.psf.file}
     elif places.psf is not None:

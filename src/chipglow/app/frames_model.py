@@ -206,9 +206,11 @@ class MeasurementModel(_FramesModel):
         stored = self.controls.emissivities(study)
         emissivity = "the emissivity"
         if stored is not None:
-            emissivity += f" or a region with a name of its file ({', '.join(stored.lines)})"
+            names = ", ".join(stored.lines)
+            emissivity += f", a region or Elsewhere with a name of its file ({names})"
+        unknown = study.emissivity is None and elsewhere_of(study) is None
         missing = {
-            emissivity: study.emissivity is None and not self.zones(study),
+            emissivity: unknown and not self.zones(study),
             "the PSF file": study.psf_source == PSF_FILE and study.psf_file is None,
             "the point spread function (PSF)": study.psf_source != PSF_FILE
             and study.camera.psf is None,
@@ -240,7 +242,8 @@ class MeasurementModel(_FramesModel):
         if tool is not None and not covers_a_pixel(tool, part.raster):
             tool = None
         lines = _emissivities(study, {one: zones[one] for one in regions}, stored, tool)
-        if not regions and not {ELSEWHERE, TOOL} & lines.keys():
+        elsewhere = elsewhere_of(study)
+        if not regions and not {elsewhere or ELSEWHERE, TOOL} & lines.keys():
             raise ValueError(
                 "no region with an emissivity reaches the corrected part: move the cursor, or set "
                 "Part or Emissivity"
@@ -251,6 +254,7 @@ class MeasurementModel(_FramesModel):
             lines,
             regions,
             tool,
+            elsewhere=elsewhere,
             surroundings=reflected_temperature(
                 COLDEST if study.camera.reflected is None else study.camera.reflected,
                 study.reflected_uncertainty,
@@ -295,6 +299,12 @@ class MeasurementModel(_FramesModel):
             estimate = pixel.estimate(values, pixel.calibration_effects(0)[None])
             numbers["uncertainty"] = float(estimate.standard_uncertainty[0, 0, 0])
         return numbers
+
+
+def elsewhere_of(study: ShownStudy) -> str | None:
+    """Return the name in the emissivity file that holds outside the regions, unless stated."""
+    stated = study.emissivity is not None or study.emissivity_file is None
+    return None if stated else study.elsewhere
 
 
 def psf_of(study: ShownStudy) -> PSFChoice:

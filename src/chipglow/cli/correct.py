@@ -252,7 +252,7 @@ def _corrected(
         emissivities,
         regions,
         measurement.tool,
-        elsewhere=known["--elsewhere"],
+        elsewhere=known["--elsewhere"] or _stated(described, "elsewhere"),
         **settings,
     )
     return result.with_notes(lab.doubts(origin, [measurement]))

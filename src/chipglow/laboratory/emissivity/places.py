@@ -169,6 +169,12 @@ class PlacesDescription(Part):
             "those that 'emissivities' states."
         ),
     ] = None
+    elsewhere: Annotated[
+        str | None,
+        Parameter(
+            "Name of the emissivity of the rest of the image in a correction, of 'emissivity_file'."
+        ),
+    ] = None
     reflected: Annotated[
         float, Parameter("Temperature of the reflected surroundings.", KELVINS)
     ] = LABORATORY
@@ -212,6 +218,11 @@ class PlacesDescription(Part):
         for name in self.emissivities.keys() - known:
             raise ValueError(
                 f"emissivities: {name!r} is no place or feature, expected one of {', '.join(known)}"
+            )
+
+        if self.elsewhere is not None and ELSEWHERE in self.emissivities:
+            raise ValueError(
+                f"elsewhere: 'emissivities' has a number for {ELSEWHERE!r}, expected one of them"
             )
 
     def places(self) -> tuple[Region, ...]:
