@@ -148,7 +148,7 @@ def test_dropped_files_of_emissivity_and_psf_correct_the_image(browser, tmp_path
     with visited(browser, tmp_path / "hot.nc", 400, 900) as page:
         dropped = page.locator("input[type=file]")
         dropped.set_input_files(tmp_path / "emissivity.nc")
-        needs = "Set the emissivity or a region with a name of its file (box 1)"
+        needs = "Set the emissivity, a region or Elsewhere with a name of its file (box 1)"
         page.locator("#status", has_text=needs).wait_for()
         choose(page, "Box")
         drag(page, (170, 150), (300, 240))

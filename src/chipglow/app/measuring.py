@@ -143,10 +143,14 @@ class Measuring:
         if self._panel is None:
             self._panel = self._build()
             self._drawn.add_tools()
-            self.tools.append(pn.pane.Bokeh(self._drawn.choice, margin=0))
             self.set_theme(self._theme)
             self._show_places()
         return self._panel
+
+    def offer_tools(self) -> None:
+        """Show the choice of the tools, which the page has by then: it activates them."""
+        if not len(self.tools):
+            self.tools.append(pn.pane.Bokeh(self._drawn.choice, margin=0))
 
     def set_theme(self, theme: str) -> None:
         """Set the colours of the curves' text."""

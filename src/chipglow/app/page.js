@@ -222,16 +222,10 @@ export function render({ view, model, el }) {
     }
     find("#undo").disabled = !can_undo;
     find("#redo").disabled = !can_redo;
-    if (spec.embedded) return;
-    const query = new URLSearchParams(link).toString();
-    address = query ? `?${query}` : location.pathname;
-    clearTimeout(addressing);
-    addressing = setTimeout(showAddress, 500); // ms; at each change a browser loads the icon again
-  }
-  let address = "", addressing = 0;
-  function showAddress() {
-    clearTimeout(addressing);
-    history.replaceState(null, "", address);
+    if (!spec.embedded) {
+      const query = new URLSearchParams(link).toString();
+      afterPaint(() => history.replaceState(null, "", query ? `?${query}` : location.pathname));
+    }
   }
 
   // Without a number the progress bar says only that something is being done.
@@ -333,7 +327,6 @@ export function render({ view, model, el }) {
   // Files, links, theme and size.
 
   each("#link", "click", async () => {
-    showAddress();
     const text = location.href;
     const copied = await navigator.clipboard?.writeText(text).then(() => true, () => false);
     find("#status").textContent = copied ? "The link is copied." : text;
@@ -410,7 +403,7 @@ export function render({ view, model, el }) {
     });
   }
   const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture,
-    chip: (url) => { find(".chip img").src = url; }, open: (key) => { location.search = `?open=${key}`; } };
+    chip: (url) => { find(".chip img").src = url; }, open: (key) => { location.search = `?open=${key}`; }, tools: () => afterPaint(() => send("tools")) };
   model.on("msg:custom", (messages) => messages.forEach(({ kind, content }) => shows[kind](content)));
   find(".images").addEventListener("pointerdown", grip);
   const watcher = new ResizeObserver(refit);

@@ -178,6 +178,7 @@ class PageView:
             "chip": self._on_chip,
             "save": self._on_save,
             "painted": self._on_painted,
+            "tools": lambda _: self.measuring.offer_tools(),
             "theme": self._on_theme,
         }
 
@@ -186,6 +187,7 @@ class PageView:
         self.session.painted(number)
         if not len(self._panels):
             self._panels.append(self.measuring.panel)
+            self._send("tools", None)
 
     def _on_theme(self, theme: str) -> None:
         self.figures.set_theme(theme)
