@@ -114,11 +114,6 @@ class PageView:
         self._picture: Picture | None = None
         self._lines: dict[str, dict[str, Array]] = {}
         self._messages: list[dict[str, Any]] = []
-        try:
-            if opened.places is not None:
-                self.measuring.restore(opened.places)
-        except ValueError as error:
-            self._refused = f"Session: {error}"
         self._panels = pn.Column(sizing_mode="stretch_width", margin=0)
         self.page = Page(
             html=_html(opened, self.figures, files is not None, embedded),
@@ -136,13 +131,19 @@ class PageView:
     def start(self, document: Document | None) -> None:
         """Set the document in which results of other threads are shown; None for a notebook.
 
-        A frame of a file is drawn at once, so that the browser has it with the page.
+        Places of a session are restored, and a frame of a file is drawn at once, so that the
+        browser has it with the page.
         """
         self._document = document
         if document is None:
             with suppress(RuntimeError):  # not in a notebook's kernel: nothing shows the page
                 self._loop = get_running_loop()
         model = self.session.model
+        try:
+            if model.places is not None:
+                self.measuring.restore(model.places)
+        except ValueError as error:
+            self._refused = f"Session: {error}"
         if not isinstance(model, SceneModel):
             with suppress(ValueError, OSError):  # stated when the page is ready
                 self._draw(model.picture(self.session.state))
