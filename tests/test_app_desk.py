@@ -379,6 +379,16 @@ def by_file(small, files):
     return view
 
 
+def corrected_page(view, folder, texts):
+    """Change controls, wait for the table of the correction, and return the session of the page."""
+    read = Event()
+    view.opened.watch(lambda: view.opened.corrected is None or read.set())  # after the table
+    view.session.change({"camera.psf": "file", "psf_file": "psf.nc", **texts})
+    assert read.wait(PATIENCE)
+    (folder / "session.yaml").write_text(text := view.measuring._session_text())
+    return text
+
+
 HEATED = ["--reference", "900 degC", "--reference-uncertainty", "9 K"]
 
 
@@ -388,16 +398,12 @@ def test_a_dropped_emissivity_file_gives_the_temperatures_of_the_commands(small,
         "  middle: {rectangle: [[240 um, 190 um], [276 um, 228 um]]}\n"
         "  side: {rectangle: [[204 um, 190 um], [234 um, 222 um]], feature: chip body}\n"
     )
-    view, read = by_file(small, files), Event()
-    measuring, session = view.measuring, view.session
-    model, texts = session.model, {"camera.psf": "file", "psf_file": "psf.nc"}
-    view.opened.watch(lambda: view.opened.corrected is None or read.set())  # after the table
-    session.change(texts | {"corrected_part": "whole"})
-    (zone,) = model.zones(session.state.study)
-    assert (zone.name, model.needs(session.state)) == ("middle", "")
-    assert read.wait(PATIENCE)
-    picture, table = view._picture, measuring._table.set_index("place")
-    (small / "session.yaml").write_text(text := measuring._session_text())
+    view = by_file(small, files)
+    text = corrected_page(view, small, {"corrected_part": "whole"})
+    model, state = view.session.model, view.session.state
+    (zone,) = model.zones(state.study)
+    assert (zone.name, model.needs(state)) == ("middle", "")
+    picture, table = view._picture, view.measuring._table.set_index("place")
     view.end()
     assert "emissivity_file: emissivity.nc\n" in text  # beside the session
     run("correct", "chip.nc", "--regions", "session.yaml", "--out", "corrected.nc")
@@ -424,14 +430,10 @@ def test_the_rest_of_an_image_has_an_emissivity_of_the_file_by_its_name(small, f
         "  middle: {rectangle: [[240 um, 190 um], [276 um, 228 um]]}\n"
         "  side: {rectangle: [[204 um, 190 um], [234 um, 222 um]]}\n"
     )
-    view, read = by_file(small, files), Event()
-    session, texts = view.session, {"camera.psf": "file", "psf_file": "psf.nc"}
+    view = by_file(small, files)
     with pytest.raises(ValueError, match=r"^Elsewhere: 'nose' has no emissivity; known are middle"):
-        session.change({"elsewhere": "nose"})
-    view.opened.watch(lambda: view.opened.corrected is None or read.set())
-    session.change(texts | {"corrected_part": "whole", "elsewhere": "side"})
-    assert read.wait(PATIENCE)
-    (small / "session.yaml").write_text(text := view.measuring._session_text())
+        view.session.change({"elsewhere": "nose"})
+    text = corrected_page(view, small, {"corrected_part": "whole", "elsewhere": "side"})
     found = view._picture.corrected.correction
     view.end()
     assert "elsewhere: side\n" in text

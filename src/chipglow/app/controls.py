@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from chipglow.analysis import LinePlace
 from chipglow.camera import MeasuredPSFFile, PSFChoice
 from chipglow.camera.exposure import frame_weights
+from chipglow.correction.known import known_parts
 from chipglow.io import load_tool
 from chipglow.laboratory.emissivity import StoredEmissivities
 from chipglow.laboratory.emissivity.places import FOUND
@@ -208,6 +209,16 @@ class ShownStudy(Study):
         float, Parameter("Standard uncertainty of the mean emissivity.", least=0.0, under=1.0)
     ] = 0.01
 
+    @property
+    def takes_elsewhere(self) -> bool:
+        """Whether a name in the emissivity file holds outside the regions: no number is stated."""
+        return self.emissivity_file is not None and self.emissivity is None
+
+    @property
+    def named_elsewhere(self) -> str | None:
+        """The name in the emissivity file that holds outside the regions, if any."""
+        return self.elsewhere if self.takes_elsewhere else None
+
     def _check_camera(self) -> None:
         """Its cut need not suit the camera: the scene exists."""
 
@@ -349,7 +360,7 @@ _CORRECTED: Final = (
         is_text=True,
         hint="file of chipglow emissivity",
     ),
-    Control("elsewhere", "Elsewhere", "Correction", is_text=True, hint="none, or a name of it"),
+    Control("elsewhere", "Elsewhere", "Correction", is_text=True, hint="none, or a name in it"),
     Control("tool", "Tool", "Correction", is_text=True, hint="none, found, or a file"),
     Control("tool_emissivity", "Tool, emissivity", "Correction", 0.05),
     Control("tool_emissivity_uncertainty", "Tool, its u (k = 1)", "Correction", 0.0, 0.1, 0.005),
@@ -491,7 +502,7 @@ class Controls:
         if path.startswith("tool_"):
             return self.has_tool or study.tool is not None
         if path == "elsewhere":
-            return study.emissivity_file is not None and study.emissivity is None
+            return study.takes_elsewhere
         return path != "psf_file" or study.psf_source == PSF_FILE
 
     def ranges(self, state: State) -> dict[str, list[float]]:
@@ -596,20 +607,14 @@ class Controls:
             if "emissivity_file" in texts and study.emissivity_file is not None:
                 file = study.emissivity_file
                 self._emissivities[file] = StoredEmissivities.read(file)
-            self._check_elsewhere(study)
+            if (stored := self.emissivities(study)) is not None:
+                known_parts(stored.lines, elsewhere=study.named_elsewhere)
             if "tool" in texts and study.tool not in (None, FOUND):
                 load_tool(str(study.tool))
         except OSError as error:
             is_of_system = error.filename is not None
             message = f"{error.filename}: {error.strerror}" if is_of_system else str(error)
             raise ValueError(message) from None
-
-    def _check_elsewhere(self, study: ShownStudy) -> None:
-        """Raise a ValueError if the emissivity outside the regions is not in the file."""
-        stored = self.emissivities(study)
-        if stored is not None and study.elsewhere not in (None, *stored.lines):
-            known = ", ".join(stored.lines)
-            raise ValueError(f"elsewhere: {study.elsewhere!r} has no emissivity; known are {known}")
 
     def emissivities(self, study: ShownStudy) -> StoredEmissivities | None:
         """Return the emissivities of the file that a state names, as they were at that time."""

@@ -43,8 +43,8 @@ def correction_data(
         data["emissivities"] = emissivities
     if study.emissivity_file is not None:
         data["emissivity_file"] = named(study.emissivity_file)
-        if study.elsewhere is not None and study.emissivity is None:
-            data["elsewhere"] = study.elsewhere
+    if study.named_elsewhere is not None:
+        data["elsewhere"] = study.named_elsewhere
     if study.psf_file is not None and study.psf_source == PSF_FILE:
         data["psf"] = {"kind": "measured", "file": named(study.psf_file)}
     elif study.camera.psf is not None:

@@ -78,8 +78,8 @@ _SIDE: Final = 180
 class Overlay:
     """A glyph that all images draw of the same data.
 
-    They share its models, and it is added as a model: a figure's own methods make one of each
-    state of a selection. A page takes as long to open as it has models.
+    The images share glyph, data and view. A figure's own methods add further glyphs, one for each
+    state of a selection; the more models a page has, the longer it takes to open.
     """
 
     source: ColumnDataSource
@@ -318,9 +318,7 @@ def _place_overlays() -> list[Overlay]:
     All are drawn in two widths (pixels) and colours, to be seen on any ground.
     """
     colours = list(LINE_COLOURS.values())
-    nowhere: dict[str, list[Any]] = {"xs": [[]] * 4, "ys": [[]] * 4}
-    halves = {"colour": ["black", "black", *colours], "width": [3.4, 3.4, 1.8, 1.8]}
-    lines = ColumnDataSource(nowhere | halves, name="lines")
+    lines = ColumnDataSource(haloed([[], []], [[], []], colours), name="lines")
     unknown = {"x": [nan] * 4, "y": [nan] * 4}
     ends = ColumnDataSource(unknown | {"colour": np.repeat(colours, 2).tolist()}, name="ends")
     crosses = {"x": [nan] * 2, "y": [nan] * 2, "colour": ["black", "white"], "width": [4.0, 1.8]}
@@ -330,6 +328,15 @@ def _place_overlays() -> list[Overlay]:
     return [Overlay(lines, outlined()), Overlay(ends, end), Overlay(cursor, cross, "overlay")]
 
 
+def haloed(
+    xs: list[list[float]], ys: list[list[float]], colours: list[str]
+) -> dict[str, list[Any]]:
+    """Return the columns of lines and of wider black ones under them."""
+    count = len(colours)
+    widths = count * [3.4] + count * [1.8]  # pixels
+    return {"xs": 2 * xs, "ys": 2 * ys, "colour": count * ["black"] + colours, "width": widths}
+
+
 def outlined() -> glyphs.MultiLine:
-    """Return lines with a colour and a width each."""
+    """Return the glyph of lines with a colour and a width each."""
     return glyphs.MultiLine(line_color="colour", line_width="width")

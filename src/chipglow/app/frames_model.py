@@ -208,7 +208,7 @@ class MeasurementModel(_FramesModel):
         if stored is not None:
             names = ", ".join(stored.lines)
             emissivity += f", a region or Elsewhere with a name of its file ({names})"
-        unknown = study.emissivity is None and elsewhere_of(study) is None
+        unknown = study.emissivity is None and study.named_elsewhere is None
         missing = {
             emissivity: unknown and not self.zones(study),
             "the PSF file": study.psf_source == PSF_FILE and study.psf_file is None,
@@ -242,7 +242,7 @@ class MeasurementModel(_FramesModel):
         if tool is not None and not covers_a_pixel(tool, part.raster):
             tool = None
         lines = _emissivities(study, {one: zones[one] for one in regions}, stored, tool)
-        elsewhere = elsewhere_of(study)
+        elsewhere = study.named_elsewhere
         if not regions and not {elsewhere or ELSEWHERE, TOOL} & lines.keys():
             raise ValueError(
                 "no region with an emissivity reaches the corrected part: move the cursor, or set "
@@ -299,12 +299,6 @@ class MeasurementModel(_FramesModel):
             estimate = pixel.estimate(values, pixel.calibration_effects(0)[None])
             numbers["uncertainty"] = float(estimate.standard_uncertainty[0, 0, 0])
         return numbers
-
-
-def elsewhere_of(study: ShownStudy) -> str | None:
-    """Return the name in the emissivity file that holds outside the regions, unless stated."""
-    stated = study.emissivity is not None or study.emissivity_file is None
-    return None if stated else study.elsewhere
 
 
 def psf_of(study: ShownStudy) -> PSFChoice:

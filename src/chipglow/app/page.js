@@ -403,7 +403,8 @@ export function render({ view, model, el }) {
     });
   }
   const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture,
-    chip: (url) => { find(".chip img").src = url; }, open: (key) => { location.search = `?open=${key}`; }, tools: () => afterPaint(() => send("tools")) };
+    chip: (url) => { find(".chip img").src = url; }, open: (key) => { location.search = `?open=${key}`; },
+    tools: () => afterPaint(() => send("tools")) };
   model.on("msg:custom", (messages) => messages.forEach(({ kind, content }) => shows[kind](content)));
   find(".images").addEventListener("pointerdown", grip);
   const watcher = new ResizeObserver(refit);

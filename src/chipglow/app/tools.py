@@ -17,16 +17,13 @@ from bokeh.models import (
     glyphs,
 )
 
-from chipglow.app.figures import MICRONS, Overlay, outlined
+from chipglow.app.figures import MICRONS, Overlay, haloed, outlined
 from chipglow.app.marks import Kind, Mark
 from chipglow.drawing.scales import COLOURS
 from chipglow.scene.regions import Point
 
 _TOOLS: Final[tuple[str, ...]] = ("look", *get_args(Kind), "edit")
 """Effect of a press on an image: move cursor and view, draw a place, or edit one."""
-
-_SAME: Final = {"circle": "box"}
-"""A circle is drawn by a box about its centre."""
 
 _ACTIVATE: Final = """
 const chosen = cb_obj.active;
@@ -58,9 +55,7 @@ class DrawnPlaces:
         chosen: Callable[[str], None],
     ) -> None:
         self._drawn, self._moved, self._removed = drawn, moved, removed
-        self._outlines = ColumnDataSource(
-            {"xs": [], "ys": [], "colour": [], "width": []}, name="outlines"
-        )
+        self._outlines = ColumnDataSource(haloed([], [], []), name="outlines")
         self._labels = ColumnDataSource({"x": [], "y": [], "name": [], "colour": []})
         self._handles = ColumnDataSource(
             {"x": [], "y": [], "colour": [], "mark": [], "handle": []}, name="handles"
@@ -92,9 +87,9 @@ class DrawnPlaces:
         groups: list[list[Any]] = [[] for _ in _TOOLS]
         for one in self._figures:
             tools = self._tools({name: overlay.draw_on(one) for name, overlay in overlays.items()})
-            one.add_tools(*tools.values())
+            one.add_tools(*dict.fromkeys(tools.values()))
             for group, name in zip(groups[1:], _TOOLS[1:], strict=True):
-                group.append(tools[_SAME.get(name, name)])
+                group.append(tools[name])
         args = {"groups": groups, "circle": _TOOLS.index("circle")}
         self.choice.js_on_change("active", CustomJS(args=args, code=_ACTIVATE))
 
@@ -104,13 +99,7 @@ class DrawnPlaces:
         outlines = [MICRONS * mark.outline.T for mark in marks]
         firsts = [outline[:, 0].tolist() for outline in outlines]
         x, y = ([outline[axis].tolist() for outline in outlines] for axis in (0, 1))
-        count = len(marks)
-        self._outlines.data = {
-            "xs": 2 * x,
-            "ys": 2 * y,
-            "colour": count * ["black"] + colours,
-            "width": count * [3.4] + count * [1.8],
-        }
+        self._outlines.data = haloed(x, y, colours)
         self._labels.data = {
             "x": [x for x, _ in firsts],
             "y": [y for _, y in firsts],
@@ -145,11 +134,16 @@ class DrawnPlaces:
         }
 
     def _tools(self, drawn: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the tools of a figure by their names; `drawn` has what they draw or edit."""
+        """Return the tools of a figure by their names; `drawn` has what they draw or edit.
+
+        A circle is drawn by a box about its centre.
+        """
+        box = BoxSelectTool(renderers=[], persistent=False)
         return {
             "point": PointDrawTool(renderers=[drawn["point"]], drag=False),
             "line": FreehandDrawTool(renderers=[drawn["line"]]),
-            "box": BoxSelectTool(renderers=[], persistent=False),
+            "box": box,
+            "circle": box,
             "polygon": PolySelectTool(renderers=[], persistent=False),
             "edit": PointDrawTool(renderers=[drawn["edit"]], add=False),
         }
