@@ -440,6 +440,10 @@ def test_the_rest_of_an_image_has_an_emissivity_of_the_file_by_its_name(small, f
     assert np.isfinite(found.data["temperature"]).all()  # not only in the region
     run("correct", "chip.nc", "--regions", "session.yaml", "--out", "corrected.nc")
     check_alike(found.data, read_correction("corrected.nc").data)
+    # Another emissivity replaces those of the session, and with them the name.
+    same = ["correct", "chip.nc", "--regions", "session.yaml"]
+    run(*same, "--emissivity", "0.5", "--out", "flat.nc")
+    assert np.isfinite(read_correction("flat.nc").data["temperature"]).all()
     again = shown(small / "session.yaml")
     assert again.session.state.study.elsewhere == "side"
     again.end()

@@ -216,6 +216,7 @@ BAD = {
     "{points: {a: [1, 2]}, emissivities: {elsewhere: {mean: 0.5}}, elsewhere: b}": (
         "elsewhere: 'emissivities' has a number"
     ),
+    "{points: {a: [1, 2]}, elsewhere: b}": "elsewhere: is a name in 'emissivity_file'",
     "{points: {a: [1, 2]}, emissivities: {b: {mean: 0.5}}}": "'b' is no place or feature",
     "{points: {a: [1, 2]}, emissivities: {a: {mean: 1.5}}}": "emissivities.a.mean",
     "{points: {a: [1, 2]}, view: {low: 9 degC, high: 8 degC}}": "low: 9 degC is not below high",

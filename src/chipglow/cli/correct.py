@@ -229,7 +229,7 @@ def _corrected(
     from chipglow.laboratory import emissivity as lab
     from chipglow.study.measured_corrections import correct_measured
 
-    file = known["--map"] or known["--emissivity"]
+    file, elsewhere = known["--map"] or known["--emissivity"], known["--elsewhere"]
     places = () if described is None else described.places()
     regions = tuple(place for place in places if place.has_area)
     if described is not None:
@@ -245,15 +245,9 @@ def _corrected(
         emissivities = emissivities_of(file, emissivity_uncertainty, described)
         origin = origin_of(file, described)
     if file is None and described is not None:
-        regions = described.zones()
+        regions, elsewhere = described.zones(), elsewhere or described.elsewhere
     result = correct_measured(
-        measurement,
-        psf,
-        emissivities,
-        regions,
-        measurement.tool,
-        elsewhere=known["--elsewhere"] or _stated(described, "elsewhere"),
-        **settings,
+        measurement, psf, emissivities, regions, measurement.tool, elsewhere=elsewhere, **settings
     )
     return result.with_notes(lab.doubts(origin, [measurement]))
 

@@ -219,11 +219,14 @@ class PlacesDescription(Part):
             raise ValueError(
                 f"emissivities: {name!r} is no place or feature, expected one of {', '.join(known)}"
             )
-
-        if self.elsewhere is not None and ELSEWHERE in self.emissivities:
+        if self.elsewhere is None:
+            return
+        if ELSEWHERE in self.emissivities:
             raise ValueError(
                 f"elsewhere: 'emissivities' has a number for {ELSEWHERE!r}, expected one of them"
             )
+        if self.emissivity_file is None:
+            raise ValueError("elsewhere: is a name in 'emissivity_file', which is missing")
 
     def places(self) -> tuple[Region, ...]:
         """Return regions, points and lines."""
