@@ -8,7 +8,9 @@ clock: the first picture, which may be a quick look, the curves along its lines,
 picture where the hand rests. Then how long the command took to the first exact picture, and the
 memory of the server. With --frames, also how long a PTW file of so many frames of 640 x 512 pixels
 takes from its settings to its image, and a click on the image to the numbers at the cursor; the
-same of empty_page.py, which is the least on this machine, and their ratio. Of each: all by the
+same of empty_page.py, which is the least on this machine, and their ratio; and how long a box takes
+from the release of the button to its mean on the image and to its row in the table, every --pause
+seconds: the app reads all frames after each. Of opening and clicks: all by the
 clock, the processor time of the server and of the processes that it started, the time in which the
 browser's main thread was busy, from the first message of the browser to the last one of the server
 before the end (for a click: server and transfer), and how many and how large the server's were.
@@ -77,13 +79,34 @@ NUMBERS = """() => {
     if (since) requestAnimationFrame(() => setTimeout(shown, 0));
   }).observe(numbers.shadowRoot ?? numbers, { childList: true, subtree: true });
 }"""
+BOXES = """() => {
+  window.boxes = [];
+  addEventListener("pointerup", () => boxes.push({ released: performance.now() }), true);
+  const shown = (what) => {
+    const box = boxes.at(-1), note = () => { box[what] ??= performance.now() - box.released; };
+    if (box) requestAnimationFrame(() => setTimeout(note, 0));
+  };
+  const labels = Bokeh.documents[0].get_model_by_name("labels");
+  labels.properties.data.change.connect(() => shown("mean"));
+  const roots = [document];
+  for (const root of roots) {
+    for (const one of root.querySelectorAll("*")) if (one.shadowRoot) roots.push(one.shadowRoot);
+  }
+  const isRow = (one) => one.classList?.contains("tabulator-row");
+  const watch = new MutationObserver((changes) => {
+    const rows = changes.flatMap((one) => [...one.addedNodes]).filter(isRow);
+    if (rows.length >= boxes.length) shown("row");
+  });
+  for (const root of roots) watch.observe(root, { childList: true, subtree: true });
+}"""
 COLUMNS = ("all", "server", "browser", "answer", "messages", "kB")
 
 
 def main():
     given = arguments(
-        __doc__, scene=Path, turns=40, controls=CONTROLS, frames=0, chromium=CHROMIUM or str
-    )
+        __doc__, scene=Path, turns=40, controls=CONTROLS, frames=0, boxes=8, pause=8.0,
+        chromium=CHROMIUM or str,
+    )  # fmt: skip
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -118,7 +141,11 @@ def report_recording(browser, folder, given):
 
     app = [sys.executable, "-m", "chipglow", "app", "--no-browser", str(recording)]
     empty = [sys.executable, str(Path(__file__).with_name("empty_page.py"))]
-    opened, cursor = opened_and_clicked(browser, app, "#figure-measured", given.turns, fill)
+    drawn = []
+    opened, cursor = opened_and_clicked(
+        browser, app, "#figure-measured", given.turns, fill,
+        lambda page: drawn.extend(boxes(page, given.boxes, given.pause)),
+    )  # fmt: skip
     floors = opened_and_clicked(browser, empty, ".picture", given.turns)
     print(f"{'':34}{''.join(f'{head:>10}' for head in COLUMNS)}   ms, but the last two")
     what = f"recording of {given.frames} frames", "cursor, median", "cursor, 95 %"
@@ -129,10 +156,35 @@ def report_recording(browser, folder, given):
             print(f"{label:34}{''.join(f'{one:10.0f}' for one in values)}")
         ratios = np.divide(times, floor, out=np.full(len(floor), np.nan), where=np.array(floor) > 0)
         print(f"{'  ratio':34}{''.join(f'{one:10.1f}' for one in ratios)}")
+    print(f"{'from release to':34}{'median':>10}{'most':>10}   ms")
+    for name, times in zip(
+        ("mean on the image", "row of the table"), np.transpose(drawn), strict=True
+    ):
+        print(f"{name:34}{np.median(times):10.0f}{times.max():10.0f}")
     print(f"load {os.getloadavg()[0]:.1f}")
 
 
-def opened_and_clicked(browser, command, image, turns, prepare=lambda page: None):
+def boxes(page, count, pause):
+    """Milliseconds from the release of each of some boxes to its mean, and to its row."""
+    page.get_by_role("button", name="Box", exact=True).click()
+    page.evaluate(BOXES)
+    place = page.locator("#figure-measured").bounding_box()
+    for number in range(count):
+        x, y = place["x"] + 90 + 15 * number, place["y"] + 60 + 10 * number
+        page.mouse.move(x, y)
+        page.mouse.down()
+        for step in (20, 40):
+            page.mouse.move(x + step, y + step)
+        page.wait_for_timeout(200)
+        page.mouse.up()
+        page.wait_for_function(f"() => boxes[{number}]?.row", timeout=60_000)
+        page.wait_for_timeout(1e3 * pause)
+    return page.evaluate("() => boxes.map((one) => [one.mean, one.row])")
+
+
+def opened_and_clicked(
+    browser, command, image, turns, prepare=lambda page: None, finish=lambda page: None
+):
     """Columns of a press on Open until the image is there, and of each click on the image."""
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         try:
@@ -161,6 +213,7 @@ def opened_and_clicked(browser, command, image, turns, prepare=lambda page: None
                 page.wait_for_timeout(400)  # a quicker second one would zoom
             for columns, shown in zip(clicked, page.evaluate("() => clicked"), strict=True):
                 columns[0] = shown
+            finish(page)
             page.close()
         finally:
             server.terminate()

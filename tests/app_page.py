@@ -17,6 +17,12 @@ def shown(path, files=None):
     return view
 
 
+def painted(measuring):
+    """Show the table and the curves of places, as the page asks for them when it has painted."""
+    measuring.show_table()
+    measuring.show_curves()
+
+
 def until(is_true):
     end = time.monotonic() + PATIENCE
     while not is_true():

@@ -85,6 +85,15 @@ def typed(settings):
 # Frames one by one
 
 
+def test_all_frames_have_the_calibration_that_was_read_at_first(ptw):
+    path, settings = ptw
+    whole = load_measurement(path, typed(settings))
+    frames = CameraFrames(load_description(path, typed(settings)), path.name)
+    (path.parent / "cal.yaml").unlink()
+    np.testing.assert_array_equal(frames.measurement(3).radiance[0], whole.radiance[3])
+    frames.close()
+
+
 @pytest.mark.usefixtures("read_here")
 @pytest.mark.parametrize("kind", ["ptw", "tiff"])
 @pytest.mark.parametrize("frames", ["none", "1:6:2"])
@@ -459,6 +468,7 @@ def test_the_table_has_the_emissivity_of_a_file_until_the_user_states_another(sm
     (small / "session.yaml").write_text(measuring._session_text())
     run("temperature", "chip.nc", "--regions", "session.yaml", "--table", "table.csv")
     table = pd.read_csv("table.csv").set_index("region").loc["middle"]
+    measuring.show_table()
     shown_row = measuring._rows.value.set_index("place").loc["middle"]
     # The table of the command has nine digits.
     for name, value in (
@@ -468,9 +478,11 @@ def test_the_table_has_the_emissivity_of_a_file_until_the_user_states_another(sm
     ):
         assert shown_row[name] == pytest.approx(value, rel=1e-7)
     measuring._on_edit(SimpleNamespace(row=1, column="emissivity", value=0.5))
+    measuring.show_table()
     row = measuring._rows.value.set_index("place").loc["middle"]
     assert (row.emissivity, row.uncertainty) == (0.5, 0.0)
     measuring._on_edit(SimpleNamespace(row=1, column="emissivity", value=None))
+    measuring.show_table()
     assert measuring._rows.value.emissivity[1] == shown_row.emissivity
     view.end()
 

@@ -20,7 +20,7 @@ from chipglow.laboratory.emissivity.places import KnownEmissivity
 from chipglow.laboratory.readings import place_curves, read_places
 
 pytest.importorskip("panel", reason="needs the extra app")
-from app_page import shown, until
+from app_page import painted, shown, until
 
 BOX = ((150e-6, 150e-6), (300e-6, 240e-6))
 SHAPES = {
@@ -44,6 +44,7 @@ def measuring(file):
     view = shown(file)
     for kind, points in SHAPES.items():
         view.measuring._add(kind, points)
+    painted(view.measuring)
     yield view.measuring
     view.end()
 
@@ -62,6 +63,23 @@ def test_rows_and_curves_of_the_drawn_places_are_those_of_the_library(measuring)
     np.testing.assert_array_equal(measuring._curves.mean, curves.mean)
     assert measuring._along.data["name"] == ["line 1"]
     assert sum(measuring._bins.data["top"]) == expected.pixels[4]  # of the last region
+
+
+def test_a_place_has_its_mean_beside_its_name_on_the_image(file):
+    view = shown(file)
+    sent = []
+    view.measuring._drawn._send = lambda kind, content: sent.append((kind, content))
+    view.measuring._add("box", BOX)
+    view.measuring._add("point", ((1e-6, 1e-6),))
+    ((kind, places),) = sent[-1:]
+    mean, cold = view.measuring._table.mean_degC
+    assert kind == "places" and np.isnan(cold)  # out of range
+    assert places["labels"]["reading"] == [f"box 1: {mean:.1f} °C", "point 1"]
+    assert places["labels"]["name"] == ["box 1", "point 1"]
+    # In µm, each with a halo.
+    assert places["outlines"]["xs"][0] == pytest.approx([150, 300, 300, 150, 150])
+    assert places["handles"]["mark"] == [0, 0, 0, 1]
+    view.end()
 
 
 def test_a_known_emissivity_gives_the_true_temperature_of_the_command(

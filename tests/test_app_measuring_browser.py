@@ -84,6 +84,13 @@ def rows(page, count):
     return [text.split("\n") for text in found.all_inner_texts()]
 
 
+def corrected_row(page):
+    """Texts of the only row once it has a true temperature."""
+    true = page.locator('.tabulator-row [tabulator-field="true_temperature_degC"]')
+    true.filter(has_text=re.compile(r"\d")).wait_for()
+    return rows(page, 1)[0]
+
+
 def saved(page, label, file):
     with page.expect_download() as started:
         page.get_by_text(label, exact=True).click()
@@ -125,7 +132,7 @@ def test_regions_and_a_file_of_the_psf_correct_the_image(browser, tmp_path):
         page.locator("#status.error", has_text="none.nc: there is no such file").wait_for()
         set_control(page, "PSF file", str(tmp_path / "psf.nc"))
         page.locator("#status", has_text=re.compile("^Corrected")).wait_for()
-        ((*_, mean, _, _, _, _, _, _, true, half_width, _),) = rows(page, 1)
+        *_, mean, _, _, _, _, _, _, true, half_width, _ = corrected_row(page)
         # At an emissivity of 0.5 and 700 K the radiance temperature is 60 K lower or more.
         assert float(true) > float(mean) + 60 and float(half_width) > 0
         saved(page, "Session, YAML", tmp_path / "session.yaml")
@@ -134,7 +141,7 @@ def test_regions_and_a_file_of_the_psf_correct_the_image(browser, tmp_path):
     assert found.psf.file == str(tmp_path / "psf.nc")
     with visited(browser, tmp_path / "session.yaml", 400, 900) as page:
         page.locator("#status", has_text=re.compile("^Corrected")).wait_for()
-        assert rows(page, 1)[0][9] == true
+        assert corrected_row(page)[9] == true
         assert page.evaluate("document.documentElement.scrollWidth") == 400
 
 
@@ -155,7 +162,7 @@ def test_dropped_files_of_emissivity_and_psf_correct_the_image(browser, tmp_path
         page.locator("#status", has_text=re.compile(r"^Measured image\. Set the point")).wait_for()
         dropped.set_input_files(tmp_path / "psf.nc")
         page.locator("#status", has_text=re.compile("^Corrected")).wait_for()
-        ((_, _, mean, *_, emissivity, _, true, half_width, _),) = rows(page, 1)
+        _, _, mean, *_, emissivity, _, true, half_width, _ = corrected_row(page)
         # The object is taken to have 900 degC in emissivity.nc, and this box is a part of it.
         assert 0 < float(emissivity) < 0.5 and float(half_width) > 0
         assert 700 < float(true) < 1100 and float(mean) < 480
@@ -184,6 +191,8 @@ def test_drawn_places_have_rows_and_curves_and_a_session_brings_them_back(browse
         choose(page, "Box")
         drag(page, (150, 150), (300, 240))
         ((name, pixels, mean, *_),) = rows(page, 1)
+        labels = "() => Bokeh.documents[0].get_model_by_name('labels').data.reading"
+        assert page.evaluate(labels) == [f"{name}: {mean} °C"]
         choose(page, "Point")
         page.mouse.click(*place(page, FIGURE, 243, 189))
         rows(page, 2)

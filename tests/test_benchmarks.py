@@ -34,7 +34,7 @@ PROGRAMS = {
         {"| middle of the chip": 4, "| rake face": 4},
     ),
     "app_latency.py": (
-        "--turns 1 --controls Seed --frames 3",
+        "--turns 1 --controls Seed --frames 3 --boxes 1 --pause 0.1",
         {
             "Seed": 5,
             "all": 4,
@@ -43,6 +43,8 @@ PROGRAMS = {
             "recording of 3 frames": 7,
             "cursor, median": 6,
             "  empty page": 6,
+            "mean on the image": 2,
+            "row of the table": 2,
         },
     ),
     "region_latency.py": (

@@ -38,7 +38,7 @@ from chipglow.laboratory.emissivity.places import (
     KnownEmissivity,
     Palette,
 )
-from chipglow.laboratory.readings import PlaceCurves
+from chipglow.laboratory.readings import PlaceCurves, PlaceReading, Profile
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.quantities.units import TEMPERATURE
 from chipglow.scene import Region
@@ -97,6 +97,9 @@ _TABLE_STYLE: Final = """
 """
 """The colours of the page, on light and on dark ground."""
 
+_TABLE_HEIGHT: Final = 180
+"""Height of the table in pixels: a new row must not move what stands below."""
+
 _LINE_HEIGHT: Final = 190
 """Height of the curves in pixels."""
 
@@ -104,8 +107,10 @@ _LINE_HEIGHT: Final = 190
 class Measuring:
     """Places on the images of a page, and what they measure.
 
-    `later` calls a function in the thread of the page, `say` shows a text of a kind, and `know`
-    takes the regions and their emissivities.
+    `later` calls a function in the thread of the page, `say` shows a text of a kind, `know` takes
+    the regions and their emissivities, and `send` sends the page a message. "ask" makes the page
+    send one of a kind once it has painted what it was sent: "tools", "table" and "curves" then
+    call `offer_tools`, `show_table` and `show_curves`.
     """
 
     def __init__(
@@ -114,17 +119,19 @@ class Measuring:
         later: Callable[[Callable[[], None]], None],
         say: Callable[..., None],
         know: Callable[[KnownRegions], None],
+        send: Callable[[str, Any], None],
     ) -> None:
-        self._opened, self._later, self._say, self._know = opened, later, say, know
+        self._opened, self._later, self._say = opened, later, say
+        self._know, self._send = know, send
         self._marks: list[Mark] = []
         self._view = ImageView()
         self._reader = Reader(opened)
         self._curves: PlaceCurves | None = None
         self._asked: tuple[Frames, tuple[Region, ...]] | None = None
-        self._table, self._counted = pd.DataFrame(), pd.DataFrame()
-        self._profiles: dict[str, pd.DataFrame] = {}
+        self._readings: list[PlaceReading] = []
+        self._table = pd.DataFrame()
         self._drawn = DrawnPlaces(
-            opened.figures, self._add, self._move, self._remove, self._hint_at
+            opened.figures, self._add, self._move, self._remove, self._hint_at, send
         )
         self._work = Newest(self._read_curves, self._failed)
         self._hint = pn.pane.HTML(_HINTS["look"], margin=2)
@@ -144,7 +151,8 @@ class Measuring:
             self._panel = self._build()
             self._drawn.add_tools()
             self.set_theme(self._theme)
-            self._show_places()
+            self.show_places()
+            self._send("ask", "tools")
         return self._panel
 
     def offer_tools(self) -> None:
@@ -198,7 +206,7 @@ class Measuring:
                 act()
             except ValueError as error:
                 self._say(str(error), "error")
-            self._show_places()
+            self.show_places()
             self._know(self._regions())
 
         self._later(change)  # together: the browser draws once
@@ -240,56 +248,67 @@ class Measuring:
         """Show the colours of a new picture, and read all places in it."""
         self._reader.forget()
         self._show_view()
-        self._show_places()
+        self.show_places()
 
-    def _show_places(self) -> None:
+    def show_places(self) -> None:
         """Show all places, and what they measure."""
         if not self._reader.is_ready:
             return
-        self._drawn.show(self._marks)
-        if self._panel is None:
-            return
-        self._show_table()
+        if not self._is_read():
+            self._work.cancel()  # it would delay the places
+            self._asked = None
+        self._readings = [self._reader.read(mark) for mark in self._marks]
+        self._table = table_of(self._readings)
+        self._drawn.show(self._marks, [one.statistics.mean for one in self._readings])
+        if self._panel is not None:
+            self._send("ask", "table")
+
+    def show_table(self) -> None:
+        """Show the table of the places, which are shown on the images before."""
+        known = list(map(self._reader.emissivity, self._marks, self._readings))
+        # Objects: an empty field, by which a user removes an emissivity, is not a number.
+        self._rows.value = self._table.reindex(columns=[*_COLUMNS]).assign(
+            emissivity=pd.Series([mean for mean, _ in known], dtype=object),
+            uncertainty=pd.Series([uncertainty for _, uncertainty in known], dtype=object),
+        )
+        self._rows.visible = bool(self._marks)
+        notes = (*(one.notes for one in self._readings), self._reader.doubts)
+        warnings = [warning for one in notes for warning in one.warnings]
+        self._warnings.object = "".join(f"<p>{escape(one)}</p>" for one in warnings)
+        self._warnings.visible = bool(warnings)
+        self._send("ask", "curves")
+
+    def show_curves(self) -> None:
+        """Show the curves along lines, the histogram, and the curves over time."""
+        self._copied.data = {"text": [self._table.to_csv(sep="\t", index=False)]}
         self._show_lines()
         self._show_histogram()
         self._ask_curves()
 
-    def _show_table(self) -> None:
-        readings = [self._reader.read(mark) for mark in self._marks]
-        self._table = table_of(readings)
-        known = list(map(self._reader.emissivity, self._marks, readings))
-        # Objects: an empty field, by which a user removes an emissivity, is not a number.
-        rows = self._table.reindex(columns=[*_COLUMNS]).assign(
-            emissivity=pd.Series([mean for mean, _ in known], dtype=object),
-            uncertainty=pd.Series([uncertainty for _, uncertainty in known], dtype=object),
-        )
-        self._rows.value = rows
-        self._rows.visible = bool(self._marks)
-        self._copied.data = {"text": [self._table.to_csv(sep="\t", index=False)]}
-        notes = (*(one.notes for one in readings), self._reader.doubts)
-        warnings = [warning for one in notes for warning in one.warnings]
-        self._warnings.object = "".join(f"<p>{escape(one)}</p>" for one in warnings)
-        self._warnings.visible = bool(warnings)
-
     def _show_lines(self) -> None:
         lines = [(number, one) for number, one in enumerate(self._marks) if one.kind == "line"]
-        profiles = [self._reader.profile(mark) for _, mark in lines]
+        profiles = self._profiles()
         self._along.data = {
             "xs": [(MICRONS * one.distance).tolist() for one in profiles],
             "ys": [(one.kelvins - ZERO_CELSIUS).tolist() for one in profiles],
             "colour": [colour_of(number) for number, _ in lines],
             "name": [mark.name for _, mark in lines],
         }
-        self._profiles = {one.place: one.to_frame() for one in profiles}
 
-    def _show_histogram(self) -> None:
-        """Show the frequency of temperatures in the selected place, by default the last region."""
+    def _profiles(self) -> list[Profile]:
+        return [self._reader.profile(mark) for mark in self._marks if mark.kind == "line"]
+
+    def _counted(self) -> int | None:
+        """Return the index of the selected place, by default of the last region."""
         areas = [number for number, mark in enumerate(self._marks) if mark.region.has_area]
         chosen = [number for number in self._rows.selection if number < len(self._marks)]
-        number = (chosen or areas[-1:] or [None])[0]
+        return (chosen or areas[-1:] or [None])[0]
+
+    def _show_histogram(self) -> None:
+        """Show the frequency of temperatures in a place."""
+        number = self._counted()
         if number is None:
             self._bins.data = {"left": [], "right": [], "top": []}
-            self._counted = pd.DataFrame()
             return
         found = self._reader.histogram(self._marks[number])
         celsius = found.edges - ZERO_CELSIUS
@@ -300,7 +319,6 @@ class Measuring:
         }
         self._frequency.title.text = f"Frequency: {found.place}"
         self._bars.glyph.fill_color = colour_of(number)
-        self._counted = found.to_frame()
 
     def _ask_curves(self) -> None:
         """Read the frames of a recording; those of a scene, which take long, when asked for."""
@@ -308,15 +326,24 @@ class Measuring:
         self._now.location = float(MICRONS * frames.times[self._opened.frame])
         is_scene, several = isinstance(frames, SceneFrames), len(frames.times) > 1
         self._compute.visible = is_scene and several and bool(self._marks)
-        asked = frames, tuple(mark.region for mark in self._marks)
-        if self._asked is not None and self._asked[0] is frames and self._asked[1] == asked[1]:
-            return  # another frame is shown, or an emissivity changed
-        self._asked = asked
+        if self._is_read():
+            return
+        self._asked = frames, self._places()
         if several and self._marks and not is_scene:
             self._work.ask(tuple(self._marks))
         else:
             self._work.cancel()
             self._show_curves(None, ())
+
+    def _is_read(self) -> bool:
+        """Return whether the places were read: another frame is shown, or an emissivity changed."""
+        if self._asked is None:
+            return False
+        frames, places = self._asked
+        return frames is self._opened.frames and places == self._places()
+
+    def _places(self) -> tuple[Region, ...]:
+        return tuple(mark.region for mark in self._marks)
 
     def _read_curves(self, marks: tuple[Mark, ...]) -> None:
         """Read places in all frames, in a separate thread."""
@@ -400,10 +427,11 @@ class Measuring:
         tables = {"places": self._table}
         if self._curves is not None:
             tables["over time"] = self._curves.to_frame()
-        if self._profiles:
-            tables["along lines"] = pd.concat(self._profiles.values(), ignore_index=True)
-        if not self._counted.empty:
-            tables["histogram"] = self._counted
+        if profiles := self._profiles():
+            frames = [one.to_frame() for one in profiles]
+            tables["along lines"] = pd.concat(frames, ignore_index=True)
+        if (number := self._counted()) is not None:
+            tables["histogram"] = self._reader.histogram(self._marks[number]).to_frame()
         return tables
 
     def _settings(self) -> dict[str, str]:
@@ -538,6 +566,8 @@ def _table_widget() -> Any:
         selectable=1,
         sortable=False,
         layout="fit_data_table",
+        widths={"place": 110},
+        height=_TABLE_HEIGHT,
         theme="simple",
         stylesheets=[_TABLE_STYLE],
         visible=False,

@@ -240,6 +240,14 @@ export function render({ view, model, el }) {
     for (const path of invalid ?? []) controls.get(path)?.field.setAttribute("aria-invalid", "true");
   }
 
+  // What a tool has drawn is shown until its place is.
+  function showPlaces(sources) {
+    for (const [name, data] of Object.entries(sources)) named(name)?.setv({ data }, { sync: false });
+    for (const name of spec.images) {
+      for (const one of named(`${name}_figure`).toolbar.tools) if (/Select/.test(one.type)) one.overlay.clear();
+    }
+  }
+
   function showNumbers(html) {
     find(".numbers").classList.remove("old");
     find(".numbers").innerHTML = html;
@@ -402,9 +410,9 @@ export function render({ view, model, el }) {
       for (let one = page; one; one = one.getRootNode().host) one.setAttribute("data-lm-suppress-shortcuts", "true");
     });
   }
-  const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture,
+  const shows = { values: showValues, status: showStatus, numbers: showNumbers, places: showPlaces, download: saveDownload, picture: showPicture,
     chip: (url) => { find(".chip img").src = url; }, open: (key) => { location.search = `?open=${key}`; },
-    tools: () => afterPaint(() => send("tools")) };
+    ask: (kind) => afterPaint(() => send(kind)) };
   model.on("msg:custom", (messages) => messages.forEach(({ kind, content }) => shows[kind](content)));
   find(".images").addEventListener("pointerdown", grip);
   const watcher = new ResizeObserver(refit);

@@ -1,6 +1,7 @@
 """Bokeh's tools on the images: they draw places, and move their handles."""
 
 from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
 from typing import Any, Final, get_args
 
 import numpy as np
@@ -19,7 +20,9 @@ from bokeh.models import (
 
 from chipglow.app.figures import MICRONS, Overlay, haloed, outlined
 from chipglow.app.marks import Kind, Mark
+from chipglow.app.reading import MEASURED
 from chipglow.drawing.scales import COLOURS
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene.regions import Point
 
 _TOOLS: Final[tuple[str, ...]] = ("look", *get_args(Kind), "edit")
@@ -43,7 +46,8 @@ class DrawnPlaces:
 
     `drawn` takes the kind and the points of a new place, `moved` the index of a place, that of its
     handle and where it is now, `removed` the index of a place, `chosen` the name of a tool; points
-    are in m.
+    are in m. `send` sends the page a message: Bokeh would send each of its sources alone, and the
+    browser paint all images again after each.
     """
 
     def __init__(
@@ -53,10 +57,12 @@ class DrawnPlaces:
         moved: Callable[[int, int, Point], None],
         removed: Callable[[int], None],
         chosen: Callable[[str], None],
+        send: Callable[[str, Any], None],
     ) -> None:
-        self._drawn, self._moved, self._removed = drawn, moved, removed
+        self._drawn, self._moved, self._removed, self._send = drawn, moved, removed, send
         self._outlines = ColumnDataSource(haloed([], [], []), name="outlines")
-        self._labels = ColumnDataSource({"x": [], "y": [], "name": [], "colour": []})
+        empty: dict[str, list[Any]] = {"x": [], "y": [], "name": [], "reading": []}
+        self._labels = ColumnDataSource(empty, name="labels")
         self._handles = ColumnDataSource(
             {"x": [], "y": [], "colour": [], "mark": [], "handle": []}, name="handles"
         )
@@ -65,12 +71,12 @@ class DrawnPlaces:
         self._strokes = ColumnDataSource({"xs": [], "ys": []})
         self.isotherm = ColumnDataSource({"xs": [], "ys": []}, name="isotherm")
         dashed = glyphs.MultiLine(line_color="white", line_width=1.6, line_dash="4 2")
-        overlays = Overlay(self._outlines, outlined()), Overlay(self.isotherm, dashed)
+        overlays = Overlay(self._outlines, outlined(), "overlay"), Overlay(self.isotherm, dashed)
         self._figures = list(figures.values())
-        for one in self._figures:
+        for name, one in figures.items():
             for overlay in overlays:
                 overlay.draw_on(one)
-            one.add_layout(self._names())
+            one.add_layout(self._names("reading" if name == MEASURED else "name"))
             # No tool is active before it is chosen: a press moves cursor and view.
             one.toolbar.update(active_drag=None, active_tap=None)
             one.on_event(SelectionGeometry, self._on_geometry)
@@ -93,18 +99,17 @@ class DrawnPlaces:
         args = {"groups": groups, "circle": _TOOLS.index("circle")}
         self.choice.js_on_change("active", CustomJS(args=args, code=_ACTIVATE))
 
-    def show(self, marks: Sequence[Mark]) -> None:
-        """Show the outlines, names and handles of places."""
+    def show(self, marks: Sequence[Mark], means: Sequence[float]) -> None:
+        """Show the outlines, names, mean readings in K, and handles of places."""
         colours = [colour_of(number) for number in range(len(marks))]
         outlines = [MICRONS * mark.outline.T for mark in marks]
         firsts = [outline[:, 0].tolist() for outline in outlines]
         x, y = ([outline[axis].tolist() for outline in outlines] for axis in (0, 1))
-        self._outlines.data = haloed(x, y, colours)
-        self._labels.data = {
+        labels = {
             "x": [x for x, _ in firsts],
             "y": [y for _, y in firsts],
             "name": [mark.name for mark in marks],
-            "colour": colours,
+            "reading": [_label(*one) for one in zip(marks, means, strict=True)],
         }
         handles = [
             (MICRONS * x, MICRONS * y, colours[number], number, index)
@@ -114,14 +119,15 @@ class DrawnPlaces:
         names = ("x", "y", "colour", "mark", "handle")
         columns = zip(*handles, strict=True) if handles else ([] for _ in names)
         self._shown = {name: list(one) for name, one in zip(names, columns, strict=True)}
-        self._handles.data = self._shown
+        shown = {"outlines": haloed(x, y, colours), "labels": labels, "handles": self._shown}
+        self._send("places", shown)
 
-    def _names(self) -> LabelSet:
-        """Return the names of the places for a figure."""
+    def _names(self, text: str) -> LabelSet:
+        """Return the names of the places for a figure, by the column that has them."""
         return LabelSet(
-            x="x", y="y", text="name", source=self._labels, x_offset=4, y_offset=4,
+            x="x", y="y", text=text, source=self._labels, x_offset=4, y_offset=4,
             text_font_size="11px", text_color="white", background_fill_color="#16191d",
-            background_fill_alpha=0.6,
+            background_fill_alpha=0.6, level="overlay",
         )  # fmt: skip
 
     def _overlays(self) -> dict[str, Overlay]:
@@ -130,21 +136,21 @@ class DrawnPlaces:
         return {
             "point": Overlay(self._points, glyphs.Scatter(size=9)),
             "line": Overlay(self._strokes, glyphs.MultiLine(line_color="white")),
-            "edit": Overlay(self._handles, handle),
+            "edit": Overlay(self._handles, handle, "overlay"),
         }
 
     def _tools(self, drawn: Mapping[str, Any]) -> dict[str, Any]:
         """Return the tools of a figure by their names; `drawn` has what they draw or edit.
 
-        A circle is drawn by a box about its centre.
+        A circle is drawn by a box about its centre. What is drawn stays until its place is shown.
         """
-        box = BoxSelectTool(renderers=[], persistent=False)
+        box = BoxSelectTool(renderers=[], persistent=True)
         return {
             "point": PointDrawTool(renderers=[drawn["point"]], drag=False),
             "line": FreehandDrawTool(renderers=[drawn["line"]]),
             "box": box,
             "circle": box,
-            "polygon": PolySelectTool(renderers=[], persistent=False),
+            "polygon": PolySelectTool(renderers=[], persistent=True),
             "edit": PointDrawTool(renderers=[drawn["edit"]], add=False),
         }
 
@@ -199,6 +205,11 @@ class DrawnPlaces:
 def colour_of(number: int) -> str:
     """Return the colour of a place by its index."""
     return COLOURS[number % len(COLOURS)]
+
+
+def _label(mark: Mark, mean: float) -> str:
+    """Return name and mean reading of a place, whose mean is in K."""
+    return f"{mark.name}: {mean - ZERO_CELSIUS:.1f} °C" if isfinite(mean) else mark.name
 
 
 def _metres(x: Sequence[float], y: Sequence[float]) -> tuple[Point, ...]:

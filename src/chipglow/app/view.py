@@ -104,7 +104,8 @@ class PageView:
         images = {name: one.figure for name, one in self.figures.images.items()}
         model, state = self.session.model, self.session.state
         self.opened = Opened(opened.name, opened.source, opened.notes, images, model.frames(state))
-        self.measuring = Measuring(self.opened, self._later, self._say, self.session.know)
+        know = self.session.know
+        self.measuring = Measuring(self.opened, self._later, self._say, know, self._send)
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._show_opened = partial(self._send, "open")
@@ -180,6 +181,8 @@ class PageView:
             "save": self._on_save,
             "painted": self._on_painted,
             "tools": lambda _: self.measuring.offer_tools(),
+            "table": lambda _: self.measuring.show_table(),
+            "curves": lambda _: self.measuring.show_curves(),
             "theme": self._on_theme,
         }
 
@@ -188,7 +191,6 @@ class PageView:
         self.session.painted(number)
         if not len(self._panels):
             self._panels.append(self.measuring.panel)
-            self._send("tools", None)
 
     def _on_theme(self, theme: str) -> None:
         self.figures.set_theme(theme)
@@ -218,6 +220,7 @@ class PageView:
         self._put_values()
         text = self._refused or "Computing the first picture."
         self._say(text, "error" if self._refused else "busy")
+        self.measuring.show_places()
         self.session.show()
 
     def _on_change(self, change: dict[str, Any]) -> None:

@@ -15,12 +15,12 @@ from chipglow.laboratory.psf.edge_image import EdgeImage, counts_image, edge_ima
 from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge, psf_kernel
 from chipglow.laboratory.psf.psf_fit import ModelFit
 from chipglow.laboratory.recordings import (
+    Conversion,
     load_calibration,
     load_description,
     load_measurement,
     load_recording,
     measurement_of,
-    pixel_correction,
     repaired_signal,
 )
 from chipglow.quantities import FileBeside, Parameter, Part
@@ -44,7 +44,7 @@ def load_edge(
         calibration = load_calibration(described.calibration)
         recording = replace(recording, band=recording.band or calibration.band)
     try:
-        signal, flags = repaired_signal(recording, *pixel_correction(described, recording))
+        signal, flags = repaired_signal(recording, *Conversion(described).pixels(recording))
         return counts_image(recording, signal, flags, name, region)
     except ValueError as error:
         raise DescriptionError(f"{source}: {str(error).removeprefix(f'{name}: ')}") from error

@@ -71,13 +71,13 @@ def place_curves(
         Called with the completed fraction after each frame. An exception raised here stops the
         reading.
     """
-    masks = [place.mask(raster) for place in places]
+    pixels = [np.flatnonzero(place.mask(raster)) for place in places]
     values = np.full((3, len(places), len(times)), np.nan)
     for frame in range(len(times)):
-        image = kelvins(frame)
-        for number, mask in enumerate(masks):
-            pixels = image[mask]
-            known = pixels[np.isfinite(pixels)]
+        image = kelvins(frame).ravel()
+        for number, chosen in enumerate(pixels):
+            inside = image[chosen]
+            known = inside[np.isfinite(inside)]
             if known.size:
                 values[:, number, frame] = known.mean(), known.min(), known.max()
         if check is not None:

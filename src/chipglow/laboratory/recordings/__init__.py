@@ -16,10 +16,10 @@ from chipglow.laboratory.recordings.calibration_fit import (
     fit_calibration as fit_calibration,
 )
 from chipglow.laboratory.recordings.camera_file import (
+    Conversion as Conversion,
     load_measurement as load_measurement,
     load_recording as load_recording,
     measurement_of as measurement_of,
-    pixel_correction as pixel_correction,
     uniform_counts as uniform_counts,
 )
 from chipglow.laboratory.recordings.description import (

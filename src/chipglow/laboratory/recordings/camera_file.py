@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from chipglow.camera import (
     LEAST_FRAMES,
     BadPixels,
+    Calibration,
     Measurement,
     NonUniformity,
     Recording,
@@ -94,15 +95,53 @@ def measurement_of(
     description: MeasurementDescription, recording: Recording, name: str
 ) -> Measurement:
     """Convert a recording to a measurement according to its description."""
-    try:
-        corrected = pixel_correction(description, recording)
-        file, limit = description.calibration, description.lower_limit
-        calibration = None if file is None else load_calibration(file)
-        return calibrate_recording(
-            recording, calibration, *corrected, limit, description.position()
-        )
-    except ValueError as error:
-        raise DescriptionError(f"{name}: {error}") from error
+    return Conversion(description).measurement(recording, name)
+
+
+@dataclass(frozen=True, eq=False)
+class Conversion:
+    """Converts recordings to measurements; the files that a description names are read once."""
+
+    description: MeasurementDescription
+
+    def measurement(self, recording: Recording, name: str) -> Measurement:
+        """Return the measurement of a recording; `name` is for errors."""
+        limit, position = self.description.lower_limit, self.description.position()
+        try:
+            corrected = self.pixels(recording)
+            return calibrate_recording(recording, self.calibration, *corrected, limit, position)
+        except ValueError as error:
+            raise DescriptionError(f"{name}: {error}") from error
+
+    @cached_property
+    def calibration(self) -> Calibration | None:
+        """Calibration that the description names."""
+        file = self.description.calibration
+        return None if file is None else load_calibration(file)
+
+    def pixels(self, recording: Recording) -> tuple[NonUniformity | None, NDArray[np.bool_] | None]:
+        """Return the pixel correction and the bad pixels of a recording."""
+        section, table = self.description.flat_field, self.description.bad_pixels
+        rows, columns = recording.signal.shape[1:]
+        bad = None if table in (None, "find") else read_bad_pixels(str(table), (rows, columns))
+        if (fields := self.flat_fields) is None:
+            return None, bad
+        for name, frames in (("high", fields.high), ("low", fields.low)):
+            for problem in () if frames is None else _problems(frames, recording):
+                raise ValueError(f"flat_field.{name}: {problem}")
+        correction = fields.correction if section.correct else None
+        return correction, fields.bad_pixels.mask if table == "find" else bad
+
+    @cached_property
+    def flat_fields(self) -> "FlatFields | None":
+        """Frames of the flat-field sources that the description names."""
+        section = self.description.flat_field
+        if section.low is not None:
+            # They do not depend on the file and frames that are corrected.
+            return read_flat_fields(replace(self.description, file=None, frames=None))
+        if section.high is not None or self.description.bad_pixels == "find":
+            raise ValueError("flat_field.low: is missing, expected frames of a flat-field source")
+        return None
 
 
 def uniform_counts(
@@ -114,7 +153,7 @@ def uniform_counts(
     try:
         if recording.quantity != "counts":
             raise ValueError(f"holds {recording.quantity}, expected counts")
-        correction, bad = pixel_correction(description, recording)
+        correction, bad = Conversion(description).pixels(recording)
         signal = recording.signal.astype(np.float64)
         if correction is not None:
             signal = correction.apply(signal)
@@ -147,26 +186,6 @@ def _unevenness(image: Array) -> float:
     errors = 1.25 * np.median(spreads) / np.sqrt([one.size for one in values])
     away = np.abs(medians - np.median(medians))
     return float(np.max(away, where=away > _DEVIATION_LIMIT * errors, initial=0.0))
-
-
-def pixel_correction(
-    description: MeasurementDescription, recording: Recording
-) -> tuple[NonUniformity | None, NDArray[np.bool_] | None]:
-    """Return the pixel correction and the bad pixels that a description defines."""
-    section, table = description.flat_field, description.bad_pixels
-    rows, columns = recording.signal.shape[1:]
-    bad = None if table in (None, "find") else read_bad_pixels(str(table), (rows, columns))
-    if section.low is None:
-        if section.high is not None or table == "find":
-            raise ValueError("flat_field.low: is missing, expected frames of a flat-field source")
-        return None, bad
-    # The correction does not depend on the file and frames that are corrected.
-    fields = read_flat_fields(replace(description, file=None, frames=None))
-    for name, frames in (("high", fields.high), ("low", fields.low)):
-        for problem in () if frames is None else _problems(frames, recording):
-            raise ValueError(f"flat_field.{name}: {problem}")
-    correction = fields.correction if section.correct else None
-    return correction, fields.bad_pixels.mask if table == "find" else bad
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from chipglow.camera import Measurement
 from chipglow.io.cameras.formats import recording_times
 from chipglow.io.cameras.stacks import Stated
 from chipglow.io.sandbox import ReaderProcess
-from chipglow.laboratory.recordings.camera_file import load_recording, measurement_of
+from chipglow.laboratory.recordings.camera_file import Conversion, load_recording
 from chipglow.laboratory.recordings.description import MeasurementDescription
 from chipglow.quantities import Array, made_from
 from chipglow.scene import Raster, Tool
@@ -98,6 +98,7 @@ class CameraFrames(_Frames):
     ) -> None:
         super().__init__()
         self._description, self._name = description, name
+        self._conversion = Conversion(description)
         self._process = process or ReaderProcess()
         chosen = description.chosen_frames() or slice(None)
         start = chosen.start or 0
@@ -121,4 +122,4 @@ class CameraFrames(_Frames):
         """Return the frame of a number in the file."""
         one = replace(self._description, frames=f"{number}:{number + 1}")
         with self._process.used():
-            return measurement_of(one, load_recording(one), self._name)
+            return self._conversion.measurement(load_recording(one), self._name)
