@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from io import BytesIO
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -76,9 +77,31 @@ def test_a_place_has_its_mean_beside_its_name_on_the_image(file):
     assert kind == "places" and np.isnan(cold)  # out of range
     assert places["labels"]["reading"] == [f"box 1: {mean:.1f} °C", "point 1"]
     assert places["labels"]["name"] == ["box 1", "point 1"]
+    assert places["labels"]["align"] == ["left", "left"]  # of a raster from 0 to 480 µm
     # In µm, each with a halo.
     assert places["outlines"]["xs"][0] == pytest.approx([150, 300, 300, 150, 150])
     assert places["handles"]["mark"] == [0, 0, 0, 1]
+    view.measuring._add("point", ((400e-6, 1e-6),))
+    assert sent[-1][1]["labels"]["align"][-1] == "right"
+    sent.clear()
+    view.measuring.show_places()
+    assert sent == []
+    view.measuring.show_again()
+    assert {*sent[0][1]} == {"outlines", "labels", "handles"}
+    view.end()
+
+
+def test_a_refused_place_is_removed_from_the_images(file):
+    view = shown(file)
+    sent = []
+    view.measuring._add("box", BOX)
+    drawn = view.measuring._drawn
+    drawn._send = lambda kind, content: sent.append(content)
+    corner = {"type": "rect", "x0": 10.0, "x1": 10.5, "y0": 10.0, "y1": 90.0}  # µm
+    drawn.choice.active = 3
+    drawn._on_geometry(SimpleNamespace(final=True, geometry=corner))
+    assert [one.name for one in view.measuring._marks] == ["box 1"]
+    assert [*sent[-1]["outlines"]["colour"]] == ["black", "#0072B2"]
     view.end()
 
 

@@ -151,7 +151,7 @@ class Measuring:
             self._panel = self._build()
             self._drawn.add_tools()
             self.set_theme(self._theme)
-            self.show_places()
+            self.show_again()
             self._send("ask", "tools")
         return self._panel
 
@@ -250,6 +250,11 @@ class Measuring:
         self._show_view()
         self.show_places()
 
+    def show_again(self) -> None:
+        """Show all places on a page that was rendered anew."""
+        self._drawn.renew()
+        self.show_places()
+
     def show_places(self) -> None:
         """Show all places, and what they measure."""
         if not self._reader.is_ready:
@@ -259,7 +264,8 @@ class Measuring:
             self._asked = None
         self._readings = [self._reader.read(mark) for mark in self._marks]
         self._table = table_of(self._readings)
-        self._drawn.show(self._marks, [one.statistics.mean for one in self._readings])
+        means = [one.statistics.mean for one in self._readings]
+        self._drawn.show(self._marks, means, self._reader.raster)
         if self._panel is not None:
             self._send("ask", "table")
 

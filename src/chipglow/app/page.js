@@ -243,6 +243,7 @@ export function render({ view, model, el }) {
   // What a tool has drawn is shown until its place is.
   function showPlaces(sources) {
     for (const [name, data] of Object.entries(sources)) named(name)?.setv({ data }, { sync: false });
+    if (!sources.outlines) return;
     for (const name of spec.images) {
       for (const one of named(`${name}_figure`).toolbar.tools) if (/Select/.test(one.type)) one.overlay.clear();
     }

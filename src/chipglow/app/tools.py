@@ -5,6 +5,7 @@ from math import isfinite
 from typing import Any, Final, get_args
 
 import numpy as np
+from bokeh.core.properties import field
 from bokeh.events import SelectionGeometry
 from bokeh.models import (
     BoxSelectTool,
@@ -23,6 +24,7 @@ from chipglow.app.marks import Kind, Mark
 from chipglow.app.reading import MEASURED
 from chipglow.drawing.scales import COLOURS
 from chipglow.quantities import ZERO_CELSIUS
+from chipglow.scene import Raster
 from chipglow.scene.regions import Point
 
 _TOOLS: Final[tuple[str, ...]] = ("look", *get_args(Kind), "edit")
@@ -61,12 +63,11 @@ class DrawnPlaces:
     ) -> None:
         self._drawn, self._moved, self._removed, self._send = drawn, moved, removed, send
         self._outlines = ColumnDataSource(haloed([], [], []), name="outlines")
-        empty: dict[str, list[Any]] = {"x": [], "y": [], "name": [], "reading": []}
-        self._labels = ColumnDataSource(empty, name="labels")
+        self._labels = ColumnDataSource(_labels([], [], 0.0), name="labels")
         self._handles = ColumnDataSource(
             {"x": [], "y": [], "colour": [], "mark": [], "handle": []}, name="handles"
         )
-        self._shown: dict[str, list[Any]] = {}
+        self._shown: dict[str, dict[str, list[Any]]] = {}
         self._points = ColumnDataSource({"x": [], "y": []})
         self._strokes = ColumnDataSource({"xs": [], "ys": []})
         self.isotherm = ColumnDataSource({"xs": [], "ys": []}, name="isotherm")
@@ -99,18 +100,11 @@ class DrawnPlaces:
         args = {"groups": groups, "circle": _TOOLS.index("circle")}
         self.choice.js_on_change("active", CustomJS(args=args, code=_ACTIVATE))
 
-    def show(self, marks: Sequence[Mark], means: Sequence[float]) -> None:
+    def show(self, marks: Sequence[Mark], means: Sequence[float], raster: Raster) -> None:
         """Show the outlines, names, mean readings in K, and handles of places."""
         colours = [colour_of(number) for number in range(len(marks))]
         outlines = [MICRONS * mark.outline.T for mark in marks]
-        firsts = [outline[:, 0].tolist() for outline in outlines]
         x, y = ([outline[axis].tolist() for outline in outlines] for axis in (0, 1))
-        labels = {
-            "x": [x for x, _ in firsts],
-            "y": [y for _, y in firsts],
-            "name": [mark.name for mark in marks],
-            "reading": [_label(*one) for one in zip(marks, means, strict=True)],
-        }
         handles = [
             (MICRONS * x, MICRONS * y, colours[number], number, index)
             for number, mark in enumerate(marks)
@@ -118,16 +112,28 @@ class DrawnPlaces:
         ]
         names = ("x", "y", "colour", "mark", "handle")
         columns = zip(*handles, strict=True) if handles else ([] for _ in names)
-        self._shown = {name: list(one) for name, one in zip(names, columns, strict=True)}
-        shown = {"outlines": haloed(x, y, colours), "labels": labels, "handles": self._shown}
-        self._send("places", shown)
+        left, right, _, _ = raster.extent
+        shown = {
+            "outlines": haloed(x, y, colours),
+            "labels": _labels(marks, means, (left + right) / 2),
+            "handles": {name: list(one) for name, one in zip(names, columns, strict=True)},
+        }
+        # A source that is sent again would end the drag of a handle.
+        changed = {name: one for name, one in shown.items() if one != self._shown.get(name)}
+        self._shown = shown
+        if changed:
+            self._send("places", changed)
+
+    def renew(self) -> None:
+        """Let all be shown again, as the page does not have it, or the user has changed it."""
+        self._shown = {}
 
     def _names(self, text: str) -> LabelSet:
         """Return the names of the places for a figure, by the column that has them."""
         return LabelSet(
-            x="x", y="y", text=text, source=self._labels, x_offset=4, y_offset=4,
-            text_font_size="11px", text_color="white", background_fill_color="#16191d",
-            background_fill_alpha=0.6, level="overlay",
+            source=self._labels, x="x", y="y", text=text, text_align=field("align"),
+            x_offset=field("offset"), y_offset=4, text_font_size="11px", text_color="white",
+            background_fill_color="#16191d", background_fill_alpha=0.6, level="overlay",
         )  # fmt: skip
 
     def _overlays(self) -> dict[str, Overlay]:
@@ -158,6 +164,7 @@ class DrawnPlaces:
         """Take a box, a circle about the middle of a box, or a polygon."""
         if not event.final:
             return
+        self.renew()
         shape = event.geometry
         if shape["type"] == "poly":
             self._drawn("polygon", _metres(shape["x"], shape["y"]))
@@ -188,13 +195,15 @@ class DrawnPlaces:
 
     def _on_handles(self, _name: str, _old: Any, new: Mapping[str, Any]) -> None:
         """Take a handle that was moved, or a place of which one was removed."""
+        shown = self._shown["handles"]
+        self.renew()
         marks, handles = (np.asarray(new[name], np.int_) for name in ("mark", "handle"))
-        before = list(zip(self._shown["mark"], self._shown["handle"], strict=True))
+        before = list(zip(shown["mark"], shown["handle"], strict=True))
         now = list(zip(marks.tolist(), handles.tolist(), strict=True))
         if len(now) < len(before):
             self._removed(next(mark for mark, handle in before if (mark, handle) not in now))
             return
-        old = np.array([self._shown["x"], self._shown["y"]], np.float64)
+        old = np.array([shown["x"], shown["y"]], np.float64)
         found = np.array([new["x"], new["y"]], np.float64)
         for index in np.flatnonzero((old != found).any(axis=0)).tolist():
             ((x, y),) = _metres([found[0, index]], [found[1, index]])
@@ -207,7 +216,21 @@ def colour_of(number: int) -> str:
     return COLOURS[number % len(COLOURS)]
 
 
-def _label(mark: Mark, mean: float) -> str:
+def _labels(marks: Sequence[Mark], means: Sequence[float], middle: float) -> dict[str, list[Any]]:
+    """Return the columns of the labels, on the side towards the middle of the image in m."""
+    firsts = [mark.outline[0] for mark in marks]
+    is_right = [bool(x > middle) for x, _ in firsts]
+    return {
+        "x": [float(MICRONS * x) for x, _ in firsts],
+        "y": [float(MICRONS * y) for _, y in firsts],
+        "name": [mark.name for mark in marks],
+        "reading": [_reading(*one) for one in zip(marks, means, strict=True)],
+        "align": ["right" if one else "left" for one in is_right],
+        "offset": [-4.0 if one else 4.0 for one in is_right],  # pixels
+    }
+
+
+def _reading(mark: Mark, mean: float) -> str:
     """Return name and mean reading of a place, whose mean is in K."""
     return f"{mark.name}: {mean - ZERO_CELSIUS:.1f} °C" if isfinite(mean) else mark.name
 

@@ -220,7 +220,7 @@ class PageView:
         self._put_values()
         text = self._refused or "Computing the first picture."
         self._say(text, "error" if self._refused else "busy")
-        self.measuring.show_places()
+        self.measuring.show_again()
         self.session.show()
 
     def _on_change(self, change: dict[str, Any]) -> None:
