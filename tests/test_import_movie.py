@@ -445,6 +445,15 @@ def test_a_movie_of_another_name_is_read(tmp_path):
     assert "h264" in a_source(path).survey().kind
 
 
+def test_a_movie_whose_metadata_are_not_in_utf8_is_read(tmp_path):
+    path = a_movie(tmp_path / "a.avi")
+    before, content = index_movie(path), path.read_bytes()
+    assert b"Lavf" in content  # the name of FFmpeg's writer, in the metadata
+    path.write_bytes(content.replace(b"Lavf", b"\xff\xfevf"))
+    after = index_movie(path)
+    assert len([*pictures(path, after, range(3))]) == before.count == 3
+
+
 def test_a_list_of_files_is_not_followed(tmp_path):
     target = a_movie(tmp_path / "a.avi")
     path = tmp_path / "list.avi"

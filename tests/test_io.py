@@ -1,6 +1,7 @@
 """Files: what comes back, what is refused, and that nothing half-written stays."""
 
 import errno
+import gc
 import shutil
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from chipglow.io import (
     open_scene,
     read_measurement,
     unfinished_scenes,
+    write_dataset,
     write_measurement,
     write_scene,
 )
@@ -348,6 +350,21 @@ def test_measurement_comes_back(tmp_path):
     xr.testing.assert_identical(found, measurement.data)
     assert found["flags"].dtype == np.uint8
     assert leftovers(tmp_path) == ["m.nc"]
+
+
+def test_memory_of_a_failed_write_is_freed(tmp_path, monkeypatch):
+    """Else Python complains when it collects the garbage, and this test fails."""
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "full")
+
+    monkeypatch.setattr("chipglow.io.measurement_file.write_hdf5", full)
+    data = xr.Dataset({"radiance": (("time", "y", "x"), np.zeros((1, 2, 3)))})
+    with pytest.raises(OSError, match="full") as failed:
+        write_dataset(data, tmp_path / "a.nc")
+    failed.value.itself = failed.value  # only the collection of cycles frees it
+    del failed
+    gc.collect()
 
 
 def test_a_foreign_measurement_is_named(tmp_path):

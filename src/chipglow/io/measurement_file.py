@@ -60,8 +60,10 @@ def write_dataset(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
         if variable.ndim and np.issubdtype(variable.dtype, np.number)
     }
     # HDF5 reads back what it wrote, which a full disk may not have taken: it writes to memory.
-    content = data.drop_encoding().to_netcdf(engine="h5netcdf", encoding=encoding)
-    write_hdf5(Path(path), lambda sink: sink.write(content))
+    stored = data.drop_encoding().to_netcdf(engine="h5netcdf", encoding=encoding)
+    with memoryview(stored) as content:  # Python cannot free memory that an error still views
+        del stored
+        write_hdf5(Path(path), lambda sink: sink.write(content))
 
 
 def _by_frame(variable: xr.Variable) -> dict[str, tuple[int, ...]]:

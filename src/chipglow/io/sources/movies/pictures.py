@@ -151,8 +151,10 @@ def _check(path: Path, index: MovieIndex, frame: Any, number: int) -> None:
 def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
     """Open a movie; errors of FFmpeg become a `SourceError`."""
     av = required("av", path, "movie", "PyAV")
+    # PyAV 19 has no such option: it opens a movie whose metadata are not in UTF-8.
+    decoding = {"metadata_errors": "replace"} if int(av.__version__.split(".")[0]) < 19 else {}
     try:
-        with av.open(f"file:{path}", options=_OPTIONS, metadata_errors="replace") as container:
+        with av.open(f"file:{path}", options=_OPTIONS, **decoding) as container:
             if not container.streams.video:
                 raise SourceError(f"{path}: there are no pictures in it, expected a movie")
             stream = container.streams.video[0]
