@@ -478,11 +478,9 @@ def test_the_table_has_the_emissivity_of_a_file_until_the_user_states_another(sm
     ):
         assert shown_row[name] == pytest.approx(value, rel=1e-7)
     measuring._on_edit(SimpleNamespace(row=1, column="emissivity", value=0.5))
-    measuring.show_table()
     row = measuring._rows.value.set_index("place").loc["middle"]
     assert (row.emissivity, row.uncertainty) == (0.5, 0.0)
     measuring._on_edit(SimpleNamespace(row=1, column="emissivity", value=None))
-    measuring.show_table()
     assert measuring._rows.value.emissivity[1] == shown_row.emissivity
     view.end()
 

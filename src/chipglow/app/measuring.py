@@ -196,17 +196,21 @@ class Measuring:
         self._change(move)
 
     def _remove(self, number: int) -> None:
-        self._change(lambda: self._marks.pop(number))
+        self._change(lambda: self._marks.pop(number), with_table=True)
 
-    def _change(self, act: Callable[[], Any]) -> None:
-        """Change the places, and show and read them; show an error if that is not possible."""
+    def _change(self, act: Callable[[], Any], with_table: bool = False) -> None:
+        """Change the places, and show and read them; show an error if that is not possible.
+
+        A change that is made in the table is shown there at once: a table that came later would
+        end the next edit.
+        """
 
         def change() -> None:
             try:
                 act()
             except ValueError as error:
                 self._say(str(error), "error")
-            self.show_places()
+            self.show_places(with_table)
             self._know(self._regions())
 
         self._later(change)  # together: the browser draws once
@@ -219,7 +223,7 @@ class Measuring:
         def edit() -> None:
             self._marks[event.row] = self._edited(event.row, event.column, event.value)
 
-        self._change(edit)
+        self._change(edit, with_table=True)
 
     def _edited(self, number: int, column: str, value: Any) -> Mark:
         """Return a place with a new name or emissivity; ValueError if it is not possible."""
@@ -255,18 +259,22 @@ class Measuring:
         self._drawn.renew()
         self.show_places()
 
-    def show_places(self) -> None:
-        """Show all places, and what they measure."""
+    def show_places(self, with_table: bool = False) -> None:
+        """Show all places, and what they measure: the table at once, or after the images."""
         if not self._reader.is_ready:
             return
-        if not self._is_read():
+        if not self._is_asked():
             self._work.cancel()  # it would delay the places
             self._asked = None
         self._readings = [self._reader.read(mark) for mark in self._marks]
         self._table = table_of(self._readings)
         means = [one.statistics.mean for one in self._readings]
         self._drawn.show(self._marks, means, self._reader.raster)
-        if self._panel is not None:
+        if self._panel is None:
+            return
+        if with_table:
+            self.show_table()
+        else:
             self._send("ask", "table")
 
     def show_table(self) -> None:
@@ -278,6 +286,7 @@ class Measuring:
             uncertainty=pd.Series([uncertainty for _, uncertainty in known], dtype=object),
         )
         self._rows.visible = bool(self._marks)
+        self._copied.data = {"text": [self._table.to_csv(sep="\t", index=False)]}
         notes = (*(one.notes for one in self._readings), self._reader.doubts)
         warnings = [warning for one in notes for warning in one.warnings]
         self._warnings.object = "".join(f"<p>{escape(one)}</p>" for one in warnings)
@@ -286,19 +295,18 @@ class Measuring:
 
     def show_curves(self) -> None:
         """Show the curves along lines, the histogram, and the curves over time."""
-        self._copied.data = {"text": [self._table.to_csv(sep="\t", index=False)]}
         self._show_lines()
         self._show_histogram()
         self._ask_curves()
 
     def _show_lines(self) -> None:
-        lines = [(number, one) for number, one in enumerate(self._marks) if one.kind == "line"]
         profiles = self._profiles()
+        numbers = [number for number, mark in enumerate(self._marks) if mark.kind == "line"]
         self._along.data = {
             "xs": [(MICRONS * one.distance).tolist() for one in profiles],
             "ys": [(one.kelvins - ZERO_CELSIUS).tolist() for one in profiles],
-            "colour": [colour_of(number) for number, _ in lines],
-            "name": [mark.name for _, mark in lines],
+            "colour": [colour_of(number) for number in numbers],
+            "name": [one.place for one in profiles],
         }
 
     def _profiles(self) -> list[Profile]:
@@ -332,7 +340,7 @@ class Measuring:
         self._now.location = float(MICRONS * frames.times[self._opened.frame])
         is_scene, several = isinstance(frames, SceneFrames), len(frames.times) > 1
         self._compute.visible = is_scene and several and bool(self._marks)
-        if self._is_read():
+        if self._is_asked():
             return
         self._asked = frames, self._places()
         if several and self._marks and not is_scene:
@@ -341,8 +349,8 @@ class Measuring:
             self._work.cancel()
             self._show_curves(None, ())
 
-    def _is_read(self) -> bool:
-        """Return whether the places were read: another frame is shown, or an emissivity changed."""
+    def _is_asked(self) -> bool:
+        """Return whether these places are read in all these frames, or will be."""
         if self._asked is None:
             return False
         frames, places = self._asked
