@@ -63,14 +63,15 @@ WATCH = """() => {
 }"""
 
 
+ROOTS = """const roots = [document];  // and those of the components in it
+  for (const root of roots) {
+    for (const one of root.querySelectorAll("*")) if (one.shadowRoot) roots.push(one.shadowRoot);
+  }"""
 NUMBERS = """() => {
   window.clicked = [];
   let asked = 0;
   addEventListener("pointerup", () => { asked = performance.now(); }, true);
-  const roots = [document];
-  for (const root of roots) {
-    for (const one of root.querySelectorAll("*")) if (one.shadowRoot) roots.push(one.shadowRoot);
-  }
+  ROOTS
   const numbers = roots.map((root) => root.querySelector(".numbers")).find(Boolean);
   new MutationObserver(() => {
     const since = asked;
@@ -78,7 +79,7 @@ NUMBERS = """() => {
     const shown = () => clicked.push(performance.now() - since);
     if (since) requestAnimationFrame(() => setTimeout(shown, 0));
   }).observe(numbers.shadowRoot ?? numbers, { childList: true, subtree: true });
-}"""
+}""".replace("ROOTS", ROOTS)
 BOXES = """() => {
   window.boxes = [];
   addEventListener("pointerup", () => boxes.push({ released: performance.now() }), true);
@@ -88,17 +89,14 @@ BOXES = """() => {
   };
   const labels = Bokeh.documents[0].get_model_by_name("labels");
   labels.properties.data.change.connect(() => shown("mean"));
-  const roots = [document];
-  for (const root of roots) {
-    for (const one of root.querySelectorAll("*")) if (one.shadowRoot) roots.push(one.shadowRoot);
-  }
+  ROOTS
   const isRow = (one) => one.classList?.contains("tabulator-row");
   const watch = new MutationObserver((changes) => {
     const rows = changes.flatMap((one) => [...one.addedNodes]).filter(isRow);
     if (rows.length >= boxes.length) shown("row");
   });
   for (const root of roots) watch.observe(root, { childList: true, subtree: true });
-}"""
+}""".replace("ROOTS", ROOTS)
 COLUMNS = ("all", "server", "browser", "answer", "messages", "kB")
 
 

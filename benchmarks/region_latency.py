@@ -8,20 +8,24 @@ without and with the true temperature. What the browser needs to paint is not in
 """
 
 import os
+import sys
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 
 import numpy as np
 from common import arguments
 
-from chipglow.app.opening import open_any
-from chipglow.app.view import PageView
 from chipglow.camera import Measurement
 from chipglow.io import write_measurement
 from chipglow.laboratory.emissivity import EmissivityLine
 from chipglow.laboratory.readings import read_place
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
+
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
+
+from app_page import painted, shown
 
 PITCH = 6e-6
 SEED = 2010
@@ -32,9 +36,7 @@ def main():
     with TemporaryDirectory() as folder:
         file = f"{folder}/image.nc"
         write_measurement(hot_spot(given.rows, given.columns), file)
-        view = PageView(open_any(file), embedded=True)
-        view.start(None)
-        _ = view.measuring.panel  # builds the table and the figures
+        view = shown(file)
         heads = "".join(f"{head:>9}" for head in ("page", "its CPU", "reading", "with U"))
         print(f"{'place':16}{'pixels':>8}{heads}   ms, median")
         for name, (kind, points) in places(view.opened.frames.raster).items():
@@ -90,10 +92,9 @@ def report(view, name, kind, points, repeats):
 
 
 def add(measuring, kind, points):
-    """Draw a place; the page asks for table and curves when it has painted the image."""
+    """Draw a place with its row and its curves."""
     measuring._add(kind, points)
-    measuring.show_table()
-    measuring.show_curves()
+    painted(measuring)
 
 
 def read_masked(image, region, line):

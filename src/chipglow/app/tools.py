@@ -64,10 +64,9 @@ class DrawnPlaces:
         self._drawn, self._moved, self._removed, self._send = drawn, moved, removed, send
         self._outlines = ColumnDataSource(haloed([], [], []), name="outlines")
         self._labels = ColumnDataSource(_labels([], [], 0.0), name="labels")
-        self._handles = ColumnDataSource(
-            {"x": [], "y": [], "colour": [], "mark": [], "handle": []}, name="handles"
-        )
+        self._handles = ColumnDataSource(_handles([]), name="handles")
         self._shown: dict[str, dict[str, list[Any]]] = {}
+        self._is_current = False  # whether the page has what was shown last
         self._points = ColumnDataSource({"x": [], "y": []})
         self._strokes = ColumnDataSource({"xs": [], "ys": []})
         self.isotherm = ColumnDataSource({"xs": [], "ys": []}, name="isotherm")
@@ -105,28 +104,22 @@ class DrawnPlaces:
         colours = [colour_of(number) for number in range(len(marks))]
         outlines = [MICRONS * mark.outline.T for mark in marks]
         x, y = ([outline[axis].tolist() for outline in outlines] for axis in (0, 1))
-        handles = [
-            (MICRONS * x, MICRONS * y, colours[number], number, index)
-            for number, mark in enumerate(marks)
-            for index, (x, y) in enumerate(mark.handles)
-        ]
-        names = ("x", "y", "colour", "mark", "handle")
-        columns = zip(*handles, strict=True) if handles else ([] for _ in names)
         left, right, _, _ = raster.extent
         shown = {
             "outlines": haloed(x, y, colours),
             "labels": _labels(marks, means, (left + right) / 2),
-            "handles": {name: list(one) for name, one in zip(names, columns, strict=True)},
+            "handles": _handles(marks),
         }
         # A source that is sent again would end the drag of a handle.
-        changed = {name: one for name, one in shown.items() if one != self._shown.get(name)}
-        self._shown = shown
+        before = self._shown if self._is_current else {}
+        changed = {name: one for name, one in shown.items() if one != before.get(name)}
+        self._shown, self._is_current = shown, True
         if changed:
             self._send("places", changed)
 
     def renew(self) -> None:
         """Let all be shown again, as the page does not have it, or the user has changed it."""
-        self._shown = {}
+        self._is_current = False
 
     def _names(self, text: str) -> LabelSet:
         """Return the names of the places for a figure, by the column that has them."""
@@ -214,6 +207,19 @@ class DrawnPlaces:
 def colour_of(number: int) -> str:
     """Return the colour of a place by its index."""
     return COLOURS[number % len(COLOURS)]
+
+
+def _handles(marks: Sequence[Mark]) -> dict[str, list[Any]]:
+    """Return the columns of the handles."""
+    numbers = [number for number, mark in enumerate(marks) for _ in mark.handles]
+    points = [point for mark in marks for point in mark.handles]
+    return {
+        "x": [MICRONS * x for x, _ in points],
+        "y": [MICRONS * y for _, y in points],
+        "colour": [colour_of(number) for number in numbers],
+        "mark": numbers,
+        "handle": [index for mark in marks for index, _ in enumerate(mark.handles)],
+    }
 
 
 def _labels(marks: Sequence[Mark], means: Sequence[float], middle: float) -> dict[str, list[Any]]:

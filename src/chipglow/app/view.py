@@ -217,6 +217,7 @@ class PageView:
     def _on_ready(self, _: None) -> None:
         """Fill a page that has just been rendered, and compute its picture."""
         self._lines = {}
+        self._messages.clear()  # of a frame that was drawn before: all is sent again
         self._put_values()
         text = self._refused or "Computing the first picture."
         self._say(text, "error" if self._refused else "busy")

@@ -1,7 +1,7 @@
 """Measurements as the laboratory's commands take them."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from hashlib import file_digest, sha256
 from pathlib import Path
@@ -100,9 +100,16 @@ def measurement_of(
 
 @dataclass(frozen=True, eq=False)
 class Conversion:
-    """Converts recordings to measurements; the files that a description names are read once."""
+    """Converts recordings of one camera to measurements.
+
+    Calibration, flat fields and bad pixels are read once.
+    """
 
     description: MeasurementDescription
+    _bad_pixels: dict[tuple[int, ...], NDArray[np.bool_]] = field(
+        init=False, default_factory=dict, repr=False
+    )
+    """Bad pixels of a table by the shape of an image."""
 
     def measurement(self, recording: Recording, name: str) -> Measurement:
         """Return the measurement of a recording; `name` is for errors."""
@@ -122,8 +129,7 @@ class Conversion:
     def pixels(self, recording: Recording) -> tuple[NonUniformity | None, NDArray[np.bool_] | None]:
         """Return the pixel correction and the bad pixels of a recording."""
         section, table = self.description.flat_field, self.description.bad_pixels
-        rows, columns = recording.signal.shape[1:]
-        bad = None if table in (None, "find") else read_bad_pixels(str(table), (rows, columns))
+        bad = None if table in (None, "find") else self._stated_bad(recording)
         if (fields := self.flat_fields) is None:
             return None, bad
         for name, frames in (("high", fields.high), ("low", fields.low)):
@@ -131,6 +137,14 @@ class Conversion:
                 raise ValueError(f"flat_field.{name}: {problem}")
         correction = fields.correction if section.correct else None
         return correction, fields.bad_pixels.mask if table == "find" else bad
+
+    def _stated_bad(self, recording: Recording) -> NDArray[np.bool_]:
+        """Return the bad pixels of the table that the description names."""
+        rows, columns = recording.signal.shape[1:]
+        if (rows, columns) not in self._bad_pixels:
+            table = str(self.description.bad_pixels)
+            self._bad_pixels[rows, columns] = read_bad_pixels(table, (rows, columns))
+        return self._bad_pixels[rows, columns]
 
     @cached_property
     def flat_fields(self) -> "FlatFields | None":
