@@ -732,6 +732,28 @@ def test_a_notebooks_page_changes_while_no_message_of_it_is_taken(monkeypatch):
     assert changed.is_set()
 
 
+def test_a_page_that_is_not_shown_takes_one_change_at_a_time(page_view):
+    """Otherwise a picture that is drawn meanwhile shows places as they were before a change."""
+    view, _ = page_view
+    taken, ended, changed = Event(), Event(), Event()
+
+    def change():
+        taken.set()
+        assert ended.wait(10)
+
+    first = Thread(target=view._later, args=(change,))
+    second = Thread(target=view._later, args=(changed.set,))
+    first.start()
+    assert taken.wait(10)
+    second.start()
+    was_changed = changed.wait(0.2)
+    ended.set()
+    first.join(10)
+    second.join(10)
+    assert not was_changed
+    assert changed.is_set()
+
+
 def test_the_page_draws_the_whole_chip_when_it_is_unfolded_if_the_scene_knows_it(opened):
     assert chip_picture(opened.scene, "#e8eaed").startswith("data:image/png;base64,iVBOR")
     page = PageView(opened).page

@@ -73,7 +73,10 @@ class Page(JSComponent):  # type: ignore[misc]
         super().__init__(**params)
 
     def alone(self, change: Callable[[], None]) -> None:
-        """Change a notebook's page while no message comes: Panel drops changes made meanwhile."""
+        """Change a page without a document while no message and no other change comes.
+
+        Panel drops what is changed while a message comes.
+        """
         with self._message:
             change()
 
@@ -443,7 +446,7 @@ class PageView:
             self._loop.call_soon_threadsafe(self.page.alone, lambda: self._reported(show))
             return
         if self._document is None:
-            self._reported(show)
+            self.page.alone(lambda: self._reported(show))
             return
         try:
             self._document.add_next_tick_callback(partial(self._together, show, self._document))
