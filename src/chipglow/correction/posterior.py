@@ -81,6 +81,14 @@ It is three times that of 100 K per pixel at 700 K, and bounds slopes where ther
 _ROUNDS: Final = 3
 """Rounds in which the weights of the prior follow from the solution and its uncertainty."""
 
+_BIAS_ROUNDS: Final = 2
+"""Times that the bias of the prior is estimated and corrected.
+
+In 32 views of cuts for tuning of ``benchmarks/correction.py``, the band was wrong by 2.9 K after
+one round, 2.7 K after two, and 2.5 K after three (root mean square); in 20 analytic scenes, by the
+noise that each round adds, by 1.15 K, 1.24 K and 1.31 K.
+"""
+
 _DRAWS_PER_ROUND: Final = 3
 """Draws from which the uncertainty in the weights of the prior follows, in each round."""
 
@@ -175,7 +183,7 @@ class Problem:
         if former is None:
             start = self._start()
             if self.beyond is not None:
-                self.from_beyond = self.beyond.image(self.beyond.constant(start))
+                self.from_beyond = self.beyond.image(self.beyond.continuation(start))
         else:
             start = self._start_from(former)
         return self._maximum(start, _ROUGH_ERROR, check)
@@ -393,10 +401,14 @@ class Posterior:
     def bias(self) -> Array:
         """Return the decrease of the solution by the prior, estimated from the solution, (part,).
 
-        Added once, it halves the order of the bias (iterated regularisation; Engl, Hanke and
-        Neubauer, Regularization of Inverse Problems, 5.1).
+        It is that of the solution, and that of this decrease itself (iterated regularisation;
+        Engl, Hanke and Neubauer, Regularization of Inverse Problems, 5.1).
         """
-        return self.solved(self.bending @ self.x, _STEP_ERROR)
+        decrease, bias = self.x, np.zeros_like(self.x)
+        for _ in range(_BIAS_ROUNDS):
+            decrease = self.solved(self.bending @ decrease, _STEP_ERROR)
+            bias += decrease
+        return bias
 
     def _sent_back(self, image: Array) -> Array:
         """Return the adjoint of `seen_change`."""
