@@ -34,7 +34,7 @@ class CorrectionFlag(IntFlag):
     INTERPOLATED = 4
     """Without a measured value: determined by its neighbours."""
     BORDER = 8
-    """Depends on the radiance beyond the image, which is taken as that at its edge."""
+    """Depends most on the radiance beyond the image, which is assumed."""
     NOT_DETERMINED = 16
     """No zone of known emissivity."""
 
