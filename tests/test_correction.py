@@ -19,6 +19,7 @@ from chipglow.correction import (
     read_correction,
     write_correction,
 )
+from chipglow.correction.beyond import _REACH
 from chipglow.correction.cells import cut_cells
 from chipglow.correction.correct import _MARGIN, _image, _problem, _problem_and_beyond
 from chipglow.correction.outline import (
@@ -375,6 +376,34 @@ def test_the_radiance_continues_beyond_the_image():
     # Without the slope of the radiance beyond the image, the mean is 2.6 K too low.
     assert abs(mean) < 0.9  # a third of it: the slopes fade, those of the field do less
     assert abs(mean) < float(result.at(inside(error, 4)).expanded_uncertainty())
+
+
+def test_a_zone_whose_hot_end_is_in_the_image_cools_beyond_it():
+    """As a workpiece under a cutting edge does, of which an image shows the contact."""
+    count = 24
+    pixels = Raster(0.0, count * PITCH, PITCH, count, count)
+    corners = ((12.0, 2.0), (60.0, 2.0), (60.0, -40.0), (12.0, -40.0))
+    points = tuple((x * PITCH, y * PITCH) for x, y in corners)
+    end = Zone("workpiece", 0.4, Region("workpiece", Polygon(points), unit="m"))
+    observed = ShapedObject((Zone("chip", 0.4), end), pixels)
+    known = Knowledge(observed, BAND, 0.0, 0.0, DARK)
+    data = Image(*np.ones((2, count, count)), *np.zeros((3, count, count), bool))
+    beyond = _problem_and_beyond(data.extended(_MARGIN), CAMERA, known, pixels).beyond
+    # It is hotter by a factor of e² and cools by 0.1 a pixel, which the image shows in two rows.
+    outer, solved = beyond.outer, beyond.solved
+    rows, columns = np.divmod(solved.cell, solved.cells.columns)
+    depth = rows / 2 - (_REACH + _MARGIN + count)  # pixels under the image
+    warm, cold = (
+        beyond.continuation(np.where(solved.zone == 1, 2.0 - 0.1 * depth, level))
+        for level in (0.0, -2.0)
+    )
+    rows, columns = np.divmod(outer.cell, outer.cells.columns)
+    column, row = (2 * (_REACH + _MARGIN + place) for place in (18, count + _REACH))
+    far = (outer.zone == 1) & (columns == column) & (rows == row)
+    # A constant would be 2, and a constant slope 0.8: the end of the zone is nearer to this.
+    assert 0.6 < warm[far][0] < 1.2
+    # The colder the image, the colder is what it does not show.
+    assert cold[far][0] < warm[far][0] - 0.1
 
 
 def test_an_interval_contains_light_that_is_not_beyond_the_image():
