@@ -707,20 +707,19 @@ print(app.files.folder.exists())
     assert ended.stdout == "False\n"
 
 
-def test_a_notebooks_page_changes_while_no_message_of_it_is_taken(monkeypatch):
-    """Panel drops what another thread changes while it takes a message of a notebook's page."""
-    from chipglow.app.view import JSComponent, Page
+def waits(change, for_other):
+    """Return whether what `change` does in a thread waits for what `for_other` does in another.
 
+    Both take the function that they are to call.
+    """
     taken, ended, changed = Event(), Event(), Event()
 
     def take(*_):
         taken.set()
         assert ended.wait(10)
 
-    monkeypatch.setattr(JSComponent, "_on_msg", take)
-    page = Page()
-    taking = Thread(target=page._on_msg, args=("", None, {}))
-    changing = Thread(target=page.alone, args=(changed.set,))
+    taking = Thread(target=for_other, args=(take,))
+    changing = Thread(target=change, args=(changed.set,))
     taking.start()
     assert taken.wait(10)
     changing.start()
@@ -728,30 +727,27 @@ def test_a_notebooks_page_changes_while_no_message_of_it_is_taken(monkeypatch):
     ended.set()
     taking.join(10)
     changing.join(10)
-    assert not was_changed
     assert changed.is_set()
+    return not was_changed
+
+
+def test_a_notebooks_page_changes_while_no_message_of_it_is_taken(monkeypatch):
+    """Panel drops what another thread changes while it takes a message of a notebook's page."""
+    from chipglow.app.view import JSComponent, Page
+
+    page = Page()
+
+    def message(take):
+        monkeypatch.setattr(JSComponent, "_on_msg", take)
+        page._on_msg("", None, {})
+
+    assert waits(page.alone, message)
 
 
 def test_a_page_that_is_not_shown_takes_one_change_at_a_time(page_view):
     """Otherwise a picture that is drawn meanwhile shows places as they were before a change."""
     view, _ = page_view
-    taken, ended, changed = Event(), Event(), Event()
-
-    def change():
-        taken.set()
-        assert ended.wait(10)
-
-    first = Thread(target=view._later, args=(change,))
-    second = Thread(target=view._later, args=(changed.set,))
-    first.start()
-    assert taken.wait(10)
-    second.start()
-    was_changed = changed.wait(0.2)
-    ended.set()
-    first.join(10)
-    second.join(10)
-    assert not was_changed
-    assert changed.is_set()
+    assert waits(view._later, view._later)
 
 
 def test_the_page_draws_the_whole_chip_when_it_is_unfolded_if_the_scene_knows_it(opened):

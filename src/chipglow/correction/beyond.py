@@ -40,7 +40,8 @@ with 0.8, 93 % to 98 %.
 """
 
 _LARGEST_RISE: Final = 1.5
-"""Largest logarithm of radiance beyond the image above that within: a factor of 4.5."""
+"""Most by which the logarithm of radiance beyond the image exceeds the largest within it: a factor
+of 4.5."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +90,7 @@ class Beyond:
         departure[self._is_known] = own[self._known] - level
         unknown = ~self._is_known
         departure[unknown] = self._factor.solve(-(self._roughness @ departure)[unknown])
-        return np.asarray(level + np.minimum(departure, own.max() - level + _LARGEST_RISE))
+        return np.asarray(np.minimum(level + departure, own.max() + _LARGEST_RISE))
 
     def image(self, values: Array, psf: PointSpreadFunction | None = None) -> Array:
         """Return the image of the light from outside the solved parts, (y, x).

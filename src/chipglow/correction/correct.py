@@ -119,9 +119,9 @@ def correct(
     weights w follow from the data around each place by expectation maximisation. Beyond the image
     the radiance continues, with slopes that fade over 16 pixels, and falls back to a low level;
     that light has a relative standard uncertainty of 100 %. The bias of the prior is estimated from
-    the solution and corrected twice.
-    Uncertainties are propagated by the linearised solution: systematic errors by one change each,
-    random fields by draws. The temperature belongs to the mean radiance over pixel and exposure.
+    the solution and corrected twice. Uncertainties are propagated by the linearised solution:
+    systematic errors by one change each, random fields by draws. The temperature belongs to the
+    mean radiance over pixel and exposure.
     """
     if isinstance(zones, ObservedObject):
         observed = zones
