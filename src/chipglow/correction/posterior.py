@@ -49,15 +49,15 @@ _STEP_TOLERANCE: Final = 3e-2
 _DRAW_ERROR: Final = 1e-2
 """Error per pixel of a draw, far below the scatter of a standard deviation from a few draws."""
 
-_ROUND_DRAW_ERROR: Final = 3e-2
-"""The same for draws from which weights of the prior follow, as means of squares."""
+_ROUND_DRAW_ERROR: Final = 1e-1
+"""The same for draws from which weights of the prior follow: 1 % of the mean of their squares."""
 
 _CHANGE_TOLERANCE: Final = 1e-5
 """Relative error of a change by a single error, which may be many standard uncertainties: for an
 emissivity that is off by 5 %, at an NETD of 0.1 K, 1e-3 left 12 % in a pixel, 1e-4 1 %."""
 
-_SOLVED_TOGETHER: Final = 3
-"""Right sides that are solved together; 1, 2, 4, 6 and 12 took 5 to 20 % longer."""
+_SOLVED_TOGETHER: Final = 2
+"""Right sides that are solved together; with three, a round would leave the other core idle."""
 
 _MOST_ITERATIONS: Final = 200
 """Most iterations of conjugate gradients."""
@@ -68,6 +68,10 @@ _BLURRED_WEIGHT: Final = 0.5
 _RIDGE: Final = 1e-2
 """Weight of all values of a change, so that parts without data and neighbours are determined: a
 standard deviation of 10 of the logarithm of radiance."""
+
+_SINGLE_RIDGE: Final = 1e-6
+"""Increase of the diagonal before rounding to single precision, so that the matrix remains positive
+definite: ten times the rounding."""
 
 _START_CURVATURE: Final = 0.02
 """Standard deviation of curvatures before they are known: 2 % of the radiance."""
@@ -448,13 +452,28 @@ class Posterior:
         reach = np.bincount(parts.pixel, parts.area * cells[parts.cell], self.pixel_weights.size)
         weights = _BLURRED_WEIGHT * reach**2
         data = image.T @ sparse.diags_array(weights) @ image
-        whole = sparse.csc_array(self.bending + data + _RIDGE * sparse.eye_array(parts.size))
-        return splu(
-            whole,
+        whole = self.bending + data + _RIDGE * sparse.eye_array(parts.size)
+        return _SingleFactors(whole)
+
+
+class _SingleFactors:
+    """Factors of a symmetric positive matrix in single precision, as a preconditioner.
+
+    They take a third less time than those in double precision, and as many iterations.
+    """
+
+    def __init__(self, matrix: Any) -> None:
+        positive = matrix + sparse.diags_array(_SINGLE_RIDGE * matrix.diagonal())
+        self._factors = splu(
+            sparse.csc_array(positive, dtype=np.float32),
             permc_spec="MMD_AT_PLUS_A",
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )
+
+    def solve(self, right: Array) -> Array:
+        """Solve for the columns of `right`."""
+        return np.asarray(self._factors.solve(right.astype(np.float32)), np.float64)
 
 
 def _conjugate_gradients(
