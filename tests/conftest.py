@@ -1,5 +1,6 @@
 """Shared by the tests: profiles of Hypothesis, the quick study, the registry of flow laws."""
 
+import gc
 import os
 import pickle
 import subprocess
@@ -51,6 +52,12 @@ def pytest_collection_modifyitems(items):
         return next((place for place, name in enumerate(makers) if name in names), len(makers))
 
     items.sort(key=place)
+
+
+def pytest_collection_finish():
+    """Let garbage collection ignore modules and tests, which remain: a sixth of all the time."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
+from command import full_disk
 from hypothesis import HealthCheck, given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 from tolerances import DOUBLE
@@ -28,6 +29,7 @@ from chipglow.io import (
     write_measurement,
     write_scene,
 )
+from chipglow.io.digest import HDF5Sink
 from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Frame, Raster, SceneError, ToolGeometry
 
@@ -273,6 +275,16 @@ def test_a_full_disk_is_one_clear_error(tmp_path, limit, count):
     assert int(index) <= count // 2
     assert message.strip().endswith(f"File too large: '{tmp_path / 'scene.nc'}'")
     assert leftovers(tmp_path) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
+def test_the_error_of_a_full_disk_keeps_no_view_of_what_was_written(tmp_path):
+    data = bytearray(20_000)
+    with HDF5Sink(tmp_path / "scene.h5") as sink, full_disk(10_000):
+        sink.write(data)
+        data.clear()  # a BufferError while there is a view
+        with pytest.raises(OSError, match="File too large"):
+            sink.check()
 
 
 def test_a_full_disk_for_a_checkpoint_names_the_scene(tmp_path, monkeypatch):

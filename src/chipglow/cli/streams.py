@@ -26,7 +26,8 @@ class _Output(FileIO):
             return super().write(data) or size
         except OSError as error:
             if error.errno != errno.EPIPE:
-                self.error = self.error or error
+                # Its traceback would keep a view of the buffer, which Python could not free.
+                self.error = self.error or error.with_traceback(None)
             return size
 
 

@@ -48,7 +48,8 @@ class HDF5Sink(FileIO):
             while self._error is None and written < len(view):
                 written += super().write(view[written:])
         except OSError as error:
-            self._error = error
+            # Its traceback would keep a view of the data, which Python could not free.
+            self._error = error.with_traceback(None)
         return len(view)
 
     def truncate(self, size: int | None = None) -> int:
