@@ -92,7 +92,7 @@ class DenseChip:
         away. Beyond the border is the mirror image.
         """
         rows, columns = self.cells.shape
-        matrix = sparse.dok_array((x.size, x.size))
+        entries, to = [], []
         values = x.reshape(self.cells.shape)
         steps = [at for at in np.ndindex(5, 5) if abs(at[0] - 2) + abs(at[1] - 2) <= 2]
         powers = [at for at in np.ndindex(5, 5) if sum(at) <= 3] + [(4, 0), (2, 2), (0, 4)]
@@ -103,11 +103,13 @@ class DenseChip:
                 raw_moments(self.slope(values, row, column, *step) / 12)
                 for step in ((1, 0), (0, 1))
             )
-            weights = weights_of @ [down[n] * right[m] for n, m in powers]
-            for (d, r), weight in zip(steps, weights, strict=True):
-                to = mirrored(row + d - 2, rows), mirrored(column + r - 2, columns)
-                matrix[to[0] * columns + to[1], row * columns + column] += weight
-        return matrix.tocsc()
+            entries.append(weights_of @ [down[n] * right[m] for n, m in powers])
+            to += [
+                mirrored(row + d - 2, rows) * columns + mirrored(column + r - 2, columns)
+                for d, r in steps
+            ]
+        places = np.array(to), np.repeat(np.arange(x.size), len(steps))
+        return sparse.coo_array((np.concatenate(entries), places), (x.size, x.size)).tocsc()
 
     def slope(self, values, row, column, down, right):
         """Return the slope at a cell, one-sided beside the outline and at the border."""
