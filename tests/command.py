@@ -1,6 +1,5 @@
 """The command line in this process, and a disk that fills up."""
 
-import resource
 import shlex
 from contextlib import contextmanager
 
@@ -56,6 +55,8 @@ def refused(arguments, *parts, code=2, **environment):
 @contextmanager
 def full_disk(most_bytes):
     """No file can grow beyond some bytes, as on a disk that fills up."""
+    import resource  # not on Windows, where other tests need this module
+
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, limits[1]))
     try:

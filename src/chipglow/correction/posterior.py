@@ -439,7 +439,7 @@ class Posterior:
             light[:, number] = formation.adjoint(image).ravel()
         return np.asarray(self.light_change.T @ light + self.bending @ changes + _RIDGE * changes)
 
-    def factor(self) -> Any:
+    def factor(self) -> "_SingleFactors":
         """Return factors of the Hessian without blur, which couples the parts of a pixel only."""
         parts = self.problem.parts
         sent = self.sent / CELLS_PER_PIXEL**2

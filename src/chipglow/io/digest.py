@@ -48,8 +48,7 @@ class HDF5Sink(FileIO):
             while self._error is None and written < len(view):
                 written += super().write(view[written:])
         except OSError as error:
-            # Its traceback would keep a view of the data, which Python could not free.
-            self._error = error.with_traceback(None)
+            self._keep(error)
         return len(view)
 
     def truncate(self, size: int | None = None) -> int:
@@ -57,8 +56,12 @@ class HDF5Sink(FileIO):
         try:
             return super().truncate(size)
         except OSError as error:
-            self._error = self._error or error
+            self._keep(error)
             return size or 0
+
+    def _keep(self, error: OSError) -> None:
+        # Its traceback would keep a view of the data, which Python could not free.
+        self._error = self._error or error.with_traceback(None)
 
     def check(self) -> None:
         """Raise the error that was kept."""
